@@ -68,7 +68,8 @@ fn every_setting_survives_a_restart_and_can_be_forgotten() {
         for (circuit, ohm, is_contact) in [
             (circuit(), 65.0, false),
             (circuit(), 40.0, true),
-            (ZeroPotential::TYPICAL, 40.0, false),
+            (ZeroPotential { drive_v: 0.22, ..circuit() }, 40.0, false),
+            (ZeroPotential { series_ohm: [0.0; 3], ..circuit() }, 40.0, false),
             (circuit(), 40.0, true),
         ] {
             host.tell(&Request::SetConstants(circuit.constants()));
@@ -98,6 +99,9 @@ fn a_configuration_of_another_version_is_not_believed_and_constants_are() {
         (kept.configuration, kept.constants)
     };
     assert_eq!(kept_now(&mut device), (Some(quiet()), true));
+    let longer = [device.journal.read(Kind::Configuration).unwrap(), &[0]].concat();
+    device.keep(Kind::Configuration, &longer).unwrap();
+    assert_eq!(kept_now(&mut device), (None, true));
     // As earlier firmware kept it: without what is sent of a confidence, and without a filter.
     let limits = b"\0\0\xa0\x40\0\0\x7a\x44\x0a\xd7\xa3\x3c\0\0\0\0";
     for before in [&b"\x01\x90\x4e\x64\x01\0\x01"[..], b"\x02\x90\x4e\x14\x01\0\x01\0"] {
@@ -145,7 +149,9 @@ fn writes_are_limited_between_restarts() {
                 assert_eq!(ask_kept(host, &keep).writes_left, left);
             }
             host.configure(quiet());
-            assert_eq!(host.refusal(&keep), Refusal::Keep(KeepFault::TooOften));
+            for request in [keep, Request::Forget(Setting::Configuration)] {
+                assert_eq!(host.refusal(&request), Refusal::Keep(KeepFault::TooOften));
+            }
         });
     }
 }

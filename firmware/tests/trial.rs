@@ -69,7 +69,8 @@ fn an_abort_and_an_undo_end_a_trial_without_touching_the_flash() {
     let words_written = |bench: &Bench<'_>| bench.slots.each_ref().map(|slot| slot.words_written);
     let mut bench = on_trial();
     let writes = words_written(&bench);
-    bench.upload(&[UploadStep::Abort]).unwrap();
+    let ended = bench.session().upload(&[UploadStep::Abort]);
+    assert_eq!(ended, (Ok(UploadState::Idle), Some(SessionEnd::NewModel)));
     assert_eq!(bench.session().model_crc(), Some(crc_of(&old())));
     assert_eq!(words_written(&bench), writes);
     let refused = bench.upload(&[UploadStep::Confirm]);
@@ -90,7 +91,16 @@ fn on_trial_nothing_overwrites_the_previous_model() {
     let mut bench = on_trial();
     assert_eq!(bench.upload(&trial_steps(&old())), Err(Refusal::OnTrial));
     assert_eq!(bench.session().model_crc(), Some(crc_of(&new())));
-    assert_eq!(bench.upload(&[UploadStep::Confirm]), Ok(confirmed(&new())));
+    let ended = bench.session().upload(&[UploadStep::Confirm]);
+    assert_eq!(ended, (Ok(confirmed(&new())), Some(SessionEnd::NewModel)));
+}
+
+#[test]
+fn a_trial_ends_when_its_model_decays() {
+    let mut bench = on_trial();
+    bench.slots[1].decay(20, 4);
+    assert_eq!(bench.session().model_crc(), Some(crc_of(&old())));
+    assert_eq!(bench.upload(&[UploadStep::Confirm]), Err(Refusal::NoUpload));
 }
 
 #[test]
@@ -118,9 +128,10 @@ fn undos_go_to_and_fro_between_two_models_and_are_limited_between_restarts() {
     assert_eq!(bench.session().undo(7).0, Err(Refusal::NothingToUndo));
     for undos in 0..100 {
         let [left, back] = if undos % 2 == 0 { [new(), old()] } else { [old(), new()] };
-        // Repeated, an undo is done already.
+        // Repeated, an undo is done already. Nothing is left to be confirmed.
         for _ in 0..2 {
             assert_eq!(bench.session().undo(crc_of(&left)).0, Ok(confirmed(&back)), "{undos}");
+            assert_eq!(bench.upload(&[UploadStep::Confirm]), Err(Refusal::NoUpload));
         }
         assert_eq!(after_restart(&mut bench).unwrap().crc_32, crc_of(&back));
     }

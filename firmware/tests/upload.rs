@@ -169,9 +169,11 @@ fn steps_out_of_order_are_refused_and_repeated_ones_are_not() {
         (chunk(&[1; 236]), Err(Refusal::Unknown)), // too long
         (chunk(&[1; 3]), out_of_place(60)),        // no whole words
         (chunk(&[1; 100]), receiving(160)),
-        (steps[0], receiving(0)), // begin anew
+        (UploadStep::Abort, Ok(UploadState::Idle)),
+        (steps[1], Err(Refusal::NoUpload)),
+        (steps[0], receiving(0)),
     ] {
-        assert_eq!(host.upload(&[step]).0, expected, "{step:?}");
+        assert_eq!(host.upload(&[step]), (expected, None), "{step:?}");
     }
     let on_trial = Ok(UploadState::OnTrial { crc_32: crc_of(&new) });
     assert_eq!(host.upload(&steps[1..]).0, on_trial);

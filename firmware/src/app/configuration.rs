@@ -69,9 +69,11 @@ mod tests {
     use super::ConfigurationField as Field;
     use super::*;
 
+    type Change = fn(&mut Configuration);
+
     #[test]
     fn each_field_is_checked() {
-        let cases: [(fn(&mut Configuration), Result<(), Field>); 21] = [
+        let cases: [(Change, Result<(), Field>); 21] = [
             (|_| (), Ok(())),
             (|it| it.frame_period_us = 0, Ok(())),
             (|it| it.frame_period_us = 99, Err(Field::FramePeriod)),

@@ -224,7 +224,7 @@ fn scanner() -> (Record, TestScanner) {
     record.answer(&[2000]);
     let drive = RowPins(["r0", "r1"].map(|name| record.pin(name)));
     let sampler = Mcp3208s { chips: record.chips() };
-    let scanner = Scanner::new(drive, sampler, record.clone(), ZeroPotential::TYPICAL);
+    let scanner = Scanner::new(drive, sampler, record.clone(), CIRCUIT);
     (record, scanner)
 }
 
@@ -244,6 +244,9 @@ fn answer(counts: u16) -> [u8; 3] {
     [0, counts.to_be_bytes()[0], counts.to_be_bytes()[1]]
 }
 
+/// A circuit with leads, which are taken out of whole frames.
+const CIRCUIT: ZeroPotential<2, 3> =
+    ZeroPotential { series_ohm: [0.5, 0.0, 1.0], ..ZeroPotential::TYPICAL };
 const WIRES: Selection<'static> =
     Selection { rows: &[RowWire(0), RowWire(1)], columns: ColumnWires::first(3) };
 const SETTINGS: ScanSettings = ScanSettings { settling_us: 46, oversampling: 4 };
@@ -275,10 +278,13 @@ fn readings_are_those_of_the_mean_counts() {
     let (record, mut scanner) = scanner();
     record.answer(&[&[250; 12][..], &[2600, 2601, 2603, 2604, 2000]].concat());
     let (frame, _) = scan(&mut scanner);
-    let mut expected = [2602.0, 2000.0, 2000.0];
-    let row = ScannedRow { row: RowWire(0), columns: WIRES.columns, load: 1.0 };
-    ZeroPotential::<2, 3>::TYPICAL.row_ohm(row, &[250.0; 3], 4095, &mut expected);
-    assert_eq!(frame[0], expected);
+    let mut expected = [[2602.0, 2000.0, 2000.0], [2000.0; 3]];
+    for (row, counts) in expected.iter_mut().enumerate() {
+        let row = ScannedRow { row: RowWire(row), columns: WIRES.columns, load: 1.0 };
+        CIRCUIT.row_ohm(row, &[250.0; 3], 4095, counts);
+    }
+    CIRCUIT.correct(WIRES.columns, expected.as_flattened_mut());
+    assert_eq!(frame, expected);
 }
 
 #[test]
@@ -318,8 +324,8 @@ fn idle_columns_are_sampled_once_a_round_and_after_whatever_changes_them() {
     // Other settings, constants or columns, and a sample that fails, begin another round; other rows do not.
     let once = ScanSettings { oversampling: 1, ..SETTINGS };
     assert_eq!([once, once].map(|settings| samples(&mut scanner, settings, WIRES)), [9, 6]);
-    let constants = ZeroPotential::<2, 3>::TYPICAL;
-    scanner.set_constants(constants.constants()).unwrap();
+    assert_eq!(scanner.constants(), Some(CIRCUIT.constants()));
+    scanner.set_constants(CIRCUIT.constants()).unwrap();
     assert_eq!([once, once].map(|settings| samples(&mut scanner, settings, WIRES)), [9, 6]);
     record.fail_transfer(Some(record.transfers() + 4));
     assert_eq!([once, once, once].map(|it| samples(&mut scanner, it, WIRES)), [6, 9, 6]);
@@ -373,12 +379,12 @@ fn a_scan_drives_only_the_rows_that_it_is_asked_for_and_reads_each_column_at_its
     events.retain(|event| matches!(event, Event::Transfer(..)));
     let asked = [1, 2, 0, 1, 2, 0].map(|column| Event::Transfer(0, vec![0x06, column << 6, 0]));
     assert_eq!(events, asked);
-    let circuit = ZeroPotential::<2, 3>::TYPICAL;
     let (idle, counts) = ([250.0, 251.0, 252.0], [2000.0, 2001.0, 2002.0]);
-    let load = circuit.load(wires.columns, &idle, 4095, &counts);
+    let load = CIRCUIT.load(wires.columns, &idle, 4095, &counts);
     let mut expected = [2001.0, 2002.0];
     let row = ScannedRow { row: RowWire(1), columns: wires.columns, load };
-    circuit.row_ohm(row, &idle, 4095, &mut expected);
+    CIRCUIT.row_ohm(row, &idle, 4095, &mut expected);
+    CIRCUIT.correct(wires.columns, &mut expected);
     assert_eq!(frame, [expected[0], expected[1], 7.0]);
 }
 

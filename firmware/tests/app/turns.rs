@@ -1,7 +1,9 @@
 //! Turns of the loop: scans in time, the watchdog, and a host that takes no bytes.
 
+use taxel_core::checksum::CRC_32;
 use taxel_firmware::app::SessionEnd;
 use taxel_firmware::link::message::{Configuration, EstimateReport, Refusal, Report, Request};
+use taxel_firmware::link::packet::PROTOCOL_VERSION;
 
 use crate::mock::*;
 
@@ -20,7 +22,9 @@ fn frames_are_scanned_on_time_numbered_and_reported() {
     let s = host.statistics();
     assert_eq!((s.frames_scanned, s.frames_decoded, s.frames_missed), (5, 5, 0));
     assert!(s.longest_scan_us >= 10 && s.longest_scan_us < 20);
-    assert_eq!((s.shortest_decode_cycles, s.longest_decode_cycles), (1000, 1000));
+    // The second look of the first frame, and that of the last.
+    assert_eq!((s.longest_decode_cycles, s.shortest_decode_cycles), (500, 100));
+    assert!(s.longest_decode_us > 0);
 }
 
 #[test]
@@ -122,9 +126,31 @@ fn a_host_that_takes_no_bytes_costs_a_report_but_not_the_device() {
 #[test]
 fn a_restart_is_answered_and_ends_the_session() {
     let mut host = started(quiet(), &blob(3, 4));
-    let (answer, end) = host.ask(&Request::Restart, |r| r == Report::Restarting);
-    assert_eq!((answer, end), (true, Some(SessionEnd::Restart)));
     // A board without a brown-out level goes on.
     assert_eq!(host.refusal(&Request::SetBrownOut), Refusal::Flash);
-    assert_eq!(host.step(), None);
+    host.pins_mut().has_brown_out = true;
+    for request in [Request::Restart, Request::SetBrownOut] {
+        let (answer, end) = host.ask(&request, |report| report == Report::Restarting);
+        assert_eq!((answer, end), (true, Some(SessionEnd::Restart)));
+    }
+}
+
+#[test]
+fn what_is_no_request_is_counted_and_refused_if_it_is_whole() {
+    let mut host = started(quiet(), &[]);
+    let whole = |covered: &[u8]| [covered, &CRC_32.checksum(covered).to_le_bytes()].concat();
+    for (packet, refusal) in [
+        (whole(&[PROTOCOL_VERSION + 1, 9, 0]), Some(Refusal::Version(PROTOCOL_VERSION))),
+        (whole(&[PROTOCOL_VERSION, 9, 255]), Some(Refusal::Unknown)),
+        (vec![PROTOCOL_VERSION, 9, 0], None),
+        (vec![1; 1000], None),
+    ] {
+        host.pins_mut().to_host.clear();
+        host.pins_mut().to_device.extend(framed(&packet));
+        host.turn(10);
+        let refused = refusal.map(|it| format!("{:?}", Report::Refused(it)));
+        assert_eq!(host.answers(9), Vec::from_iter(refused));
+    }
+    let s = host.statistics();
+    assert_eq!((s.bad_packets, s.requests), (4, 1));
 }

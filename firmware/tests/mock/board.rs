@@ -29,6 +29,8 @@ pub struct Pins {
     /// Number of scans that it began so, and of those that were given up.
     pub started: u32,
     pub stopped: u32,
+    /// Whether it has a brown-out level, which can be set.
+    pub has_brown_out: bool,
     /// Number of times that the watchdog was fed.
     pub feeds: u32,
     /// Number of bytes that the host's side still takes; `None` takes all.
@@ -37,6 +39,7 @@ pub struct Pins {
     pub gap_us: u32,
     /// When it took the last byte.
     taken_us: u32,
+    looks: u32,
     cycles: u32,
 }
 
@@ -65,10 +68,11 @@ impl Clock for Board {
         pins.now_us
     }
 
-    /// Each look takes a thousand cycles.
+    /// Each look takes fewer cycles than the one before: 1000, 500, 333.
     fn cycles(&self) -> u32 {
         let mut pins = self.pins.borrow_mut();
-        pins.cycles = pins.cycles.wrapping_add(1000);
+        pins.looks += 1;
+        pins.cycles = pins.cycles.wrapping_add(1000 / pins.looks);
         pins.cycles
     }
 }
@@ -111,6 +115,10 @@ impl Storage for Board {
 
 impl Platform for Board {
     const BOARD: &'static str = "test";
+
+    fn set_brown_out(&mut self) -> bool {
+        self.pins.borrow().has_brown_out
+    }
 
     fn memory(&self) -> Memory {
         Memory { stack_reserved: 1024, ..Memory::default() }
