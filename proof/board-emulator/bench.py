@@ -58,6 +58,8 @@ class Bench:
         with tempfile.TemporaryDirectory() as directory, open(pathlib.Path(directory) / "clock", "w+b") as file:
             os.ftruncate(file.fileno(), mmap.PAGESIZE)
             clock = HostClock.from_buffer(mmap.mmap(file.fileno(), mmap.PAGESIZE))
+            # Before it starts: a clock that jumped later would end its waits.
+            clock.now_us = int(self.board.time.seconds() * 1e6)
             library = native("host_clock.c", directory)
             environment = {**os.environ, "LD_PRELOAD": str(library), "BOARD_CLOCK": file.name}
             host = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,

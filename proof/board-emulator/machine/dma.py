@@ -17,7 +17,7 @@ STREAMS = 8
 
 class Dma(Registers):
     """Streams. `register(address, value, cycle)` takes what DMA writes to a register; `advance` is called before an access,
-    `seen` when the program finds a transfer complete.
+    `seen` when the program looks at the flags and a transfer has ended since.
     """
 
     def __init__(self, uc, rules, advance, register, seen):
@@ -25,6 +25,8 @@ class Dma(Registers):
         self._uc, self._rules, self._advance, self._register, self._seen = uc, rules, advance, register, seen
         #: Streams that move nothing: a fault.
         self.stalled = set()
+        #: Whether a transfer has ended that the program has not seen.
+        self._news = False
         #: Flags of each stream, items that are left, and the next place in memory.
         self.flags, self._left, self._place = [0] * STREAMS, [0] * STREAMS, [0] * STREAMS
 
@@ -36,7 +38,8 @@ class Dma(Registers):
         if offset < LIFCR:
             first = offset
             found = sum(self.flags[first + index] << place for index, place in enumerate(FLAG_PLACES))
-            if any(self.flags[first + index] & COMPLETE for index in range(4)):
+            if self._news:
+                self._news = False
                 self._seen()
             return found
         stream, register = divmod(offset - FIRST_STREAM, STREAM_BYTES)
@@ -78,6 +81,7 @@ class Dma(Registers):
     def _count(self, stream, items):
         self._left[stream] -= items
         if not self._left[stream]:
+            self._news = True
             self.flags[stream] |= COMPLETE | HALF
             self.values[FIRST_STREAM + STREAM_BYTES * stream + CR] &= ~EN
 
