@@ -91,7 +91,7 @@ class Bench:
         self._number = self._number % 126 + 1
         start, number, answers, resets = board.time.seconds(), self._number, [], len(board.resets)
         line = board.usart.to_host
-        board.usart.from_host.extend(before + framed(message, number, protocol_version()))
+        board.usart.from_host.extend(before + request(message, number))
 
         def over():
             whole = line.rfind(0) + 1
@@ -136,6 +136,11 @@ class Bench:
 def protocol_version():
     """Version of the link's protocol."""
     return int(re.search(r"PROTOCOL_VERSION: u8 = (\d+);", PACKET.read_text())[1])
+
+
+def request(message, number=127):
+    """A request as it goes over the line, with a number of one byte; none of `Bench.ask` has 127."""
+    return framed(message, number, protocol_version())
 
 
 #: Number of a blob's first bytes that begin an upload.

@@ -12,7 +12,7 @@ import re
 import signal
 import struct
 
-from bench import ERASE_PATIENCE_S, IDENTIFY, KEEP_CONFIGURATION, RESTART, begin, expect
+from bench import ERASE_PATIENCE_S, IDENTIFY, KEEP_CONFIGURATION, RESTART, begin, expect, request
 from faults import FAULTS, OF_CIRCUIT
 from machine.flash import FACTORY_OPTIONS, LEVEL_3_OPTIONS, PROGRAM_S, SECTORS
 from machine.line import Terminal, packets, taken, varint
@@ -137,11 +137,16 @@ def check_scan_time(bench, model):
 
 
 def slow_erase(make, files):
-    """The slowest erase, with the watchdog at its fastest, while the sensor is scanned."""
+    """The slowest erase, with the watchdog at its fastest, while the sensor is scanned; and what a host sends meanwhile."""
     bench = make(lsi_hz=FASTEST_LSI_HZ, erase_s=SLOWEST_ERASE_S)
     bench.run_for(0.05)
-    seconds = bench.ask(begin(files.model.read_bytes()), UPLOAD, ERASE_PATIENCE_S)[1]
+    # Behind the one that erases, requests of as many bytes as a device must keep.
+    more = ROOM // len(request(IDENTIFY)) - 1
+    requests = request(begin(files.model.read_bytes())) + more * request(IDENTIFY)
+    seconds = bench.ask(IDENTIFY, IDENTITY, ERASE_PATIENCE_S, before=requests)[1]
     expect(seconds > SLOWEST_ERASE_S, f"the erase takes {seconds:.2f} s")
+    found = ask_statistics(bench)["requests"]
+    expect(found == more + 3, f"{found} requests arrived of {more + 3}")
     bench.run_for(0.1)
     bench.finish(erased=[JOURNAL[1], SLOT_B])
 
@@ -321,16 +326,14 @@ def burst(make, files):
 
 
 def overrun(make, files):
-    """A byte is overrun between a look at the port's status and one at its data: the error alone must not block."""
+    """A host that sends three times what a device keeps, during an erase: what is cut is counted, and the next request is answered."""
     bench = make()
     bench.run_for(0.02)
-    bench.board.usart.overrun()
-    before = bench.board.interrupts
-    bench.run_for(0.005)
-    # An estimate of 600 bytes may be under way, each with an interrupt.
-    expect(bench.board.interrupts - before < ROOM, "the port's interrupt never rests")
-    bench.ask(IDENTIFY, IDENTITY)
-    bench.finish()
+    line = bench.board.usart.from_host
+    line.extend(request(begin(files.model.read_bytes())) + request(IDENTIFY) * (3 * ROOM // len(request(IDENTIFY))))
+    bench.run_for(ERASE_PATIENCE_S)
+    expect(ask_statistics(bench)["bad_packets"] == 1, "no damaged packet is counted")
+    bench.finish(erased=[JOURNAL[1], SLOT_B])
 
 
 def log_abandoned(make, files):

@@ -88,7 +88,7 @@ impl Board {
         let readout =
             OwnConverters::start(converters, parts.DMA2, (parts.TIM1, parts.TIM8), &mut rcc);
 
-        let serial = Serial::start(parts.USART2, gpioa.pa2, gpioa.pa3, &mut rcc)?;
+        let serial = Serial::start(parts.USART2, parts.DMA1, (gpioa.pa2, gpioa.pa3), &mut rcc)?;
         let clock = Clock::start(parts.TIM2, &mut rcc)?;
         let (slots, pages) = Slot::all(parts.FLASH);
         Some(Self {

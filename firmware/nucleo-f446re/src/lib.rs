@@ -11,6 +11,7 @@ mod power;
 mod flash;
 mod oscillator;
 mod reset;
+mod dma;
 mod serial;
 mod slot;
 mod own_converters;

@@ -26,6 +26,8 @@ use taxel_firmware::timing::{
     ONCHIP_COLUMNS, ONCHIP_ROWS, ONCHIP_SAMPLES, ONCHIP_TRIGGER_TICKS, RowCounts,
 };
 
+use crate::dma::{COUNT_UP, FROM_MEMORY, start_stream};
+
 /// Number of columns.
 pub const COLUMNS: usize = ONCHIP_COLUMNS as usize;
 
@@ -74,14 +76,9 @@ pub(crate) const CHANNELS: [[u32; 3]; 3] = [[0, 1, 4], [6, 7, 8], [10, 11, 12]];
 /// Field of a stream of DMA2 that chooses timer 1's requests; those of the converters are 0.
 const OF_TIMER_1: u32 = 6 << 25;
 
-/// Fields of a stream's control register: enabled; from memory; memory address counts up; words, or half-words; and the highest
-/// priority.
-const ENABLED: u32 = 1 << 0;
-const FROM_MEMORY: u32 = 1 << 6;
-const COUNT_UP: u32 = 1 << 10;
+/// Fields of a stream's control register: words, or half-words.
 const WORDS: u32 = 2 << 11 | 2 << 13;
 const HALF_WORDS: u32 = 1 << 11 | 1 << 13;
-const FIRST: u32 = 3 << 16;
 
 /// Flags of streams 0 to 3 and 4 to 7: complete are the numbers, and the end; an error of any stream.
 pub(crate) const NUMBERS_COMPLETE: u32 = 1 << 5;
@@ -180,18 +177,6 @@ impl OwnConverters {
         this
     }
 
-    /// Starts a stream of so many `items` between memory and a register, with these fields.
-    fn start_stream(stream: &ST, memory: usize, register: usize, items: usize, fields: u32) {
-        // SAFETY: the addresses are of `MEMORY` and of a register, and the items are as many as there is room for.
-        unsafe {
-            stream.par().write(|w| w.bits(register as u32));
-            stream.m0ar().write(|w| w.bits(memory as u32));
-            stream.ndtr().write(|w| w.bits(items as u32));
-            stream.cr().write(|w| w.bits(fields | FIRST));
-            stream.cr().write(|w| w.bits(fields | FIRST | ENABLED));
-        }
-    }
-
     /// Streams of the numbers, of the second half, of the end and of the rows.
     pub(crate) fn streams(&self) -> [&ST; 4] {
         [self.dma.st(0), self.dma.st(2), self.dma.st(5), self.dma.st(6)]
@@ -221,7 +206,6 @@ impl Sequencer<COLUMNS> for OwnConverters {
         ]
         .map(<*const _>::expose_provenance);
         let to = (&raw mut memory.numbers).expose_provenance();
-        fence(Ordering::SeqCst); // what was written is there before DMA reads
         let changes = GPIOB::PTR.addr() + 0x18;
         let number = ADC_COMMON::PTR.addr() + 0x08;
         // SAFETY: writing ones clears these flags.
@@ -230,11 +214,14 @@ impl Sequencer<COLUMNS> for OwnConverters {
             self.dma.hifcr().write(|w| w.bits(HIGH_FLAGS));
         }
         let [of_numbers, of_switch, of_end, of_rows] = self.streams();
-        Self::start_stream(of_numbers, to, number, numbers, HALF_WORDS | COUNT_UP);
         let fields = OF_TIMER_1 | FROM_MEMORY | WORDS;
-        Self::start_stream(of_rows, rows, changes, lines, fields | COUNT_UP);
-        Self::start_stream(of_switch, select, changes, lines, fields);
-        Self::start_stream(of_end, rest, changes, 1, fields);
+        // SAFETY: the addresses are of `MEMORY` and of registers, and the items are as many as there is room for.
+        unsafe {
+            start_stream(of_numbers, to, number, numbers, HALF_WORDS | COUNT_UP);
+            start_stream(of_rows, rows, changes, lines, fields | COUNT_UP);
+            start_stream(of_switch, select, changes, lines, fields);
+            start_stream(of_end, rest, changes, 1, fields);
+        }
         let (rows, triggers) = &self.timers;
         // SAFETY: all are counts or the fields that their constants tell.
         unsafe {

@@ -14,11 +14,11 @@ from .rules import Fault, Rules
 from .scan_timers import Passes
 from .timer import Timer
 from .time import Time
-from .usart import Usart
+from .usart import SENT, Usart
 from .watchdog import Watchdog
 
-#: Number of the interrupt of USART2, and of the first interrupt among the exceptions.
-USART2, FIRST_INTERRUPT = 38, 16
+#: Number of the interrupt of the stream that sends, and of the first interrupt among the exceptions.
+DMA1_STREAM6, FIRST_INTERRUPT = 17, 16
 #: Numbers of exceptions.
 NMI, HARD_FAULT = 2, 3
 #: How the name of the function ends that all panics go through.
@@ -107,7 +107,8 @@ class Board:
         self.flash.wait_states_changed = self.rcc.check
         self.core = Core(time, rules, self._wait, self._ask_for_reset)
         self.usart = Usart(time, rules, lambda: self.rcc.clocks.pclk1, lambda: self.rcc.clock_error(), self._baud)
-        self.usart.on_send = self._before_sending
+        self.usart.on_byte = self._before_byte
+        usart_dma = self.usart.dma = Dma(self.cpu.uc, rules, self.usart.advance, self.usart.send_by_dma, started=self.usart.serve)
         self.timer = Timer(time, lambda: self.rcc.clocks.timer1, self._look, self._idle)
         self.watchdog = Watchdog(time, rules, self._lsi_hz)
         bus.attach(0x00000, self.timer, "TIM2")
@@ -118,6 +119,7 @@ class Board:
             bus.attach(0x20000 + 0x400 * index, port, f"GPIO{'ABC'[index]}")
         bus.attach(0x23800, self.rcc, "RCC", gated=False)
         bus.attach(0x23C00, self.flash, "FLASH", gated=False)
+        bus.attach(0x26000, usart_dma, "DMA1")
         self._start_converters(bus)
         self._plant(self)
         self._idles, self._pins_checked, self._next_glance, self._patience = False, False, 0, 1
@@ -252,7 +254,8 @@ class Board:
     # Time
 
     def _interrupt_pending(self):
-        return self.core.enabled >> USART2 & 1 and self.usart.interrupt()
+        asks = self.core.asked >> DMA1_STREAM6 & 1 or self.usart.dma.interrupt(SENT)
+        return self.core.enabled >> DMA1_STREAM6 & 1 and asks
 
     def _clocks_changed(self, clocks):
         self.note(f"runs at {clocks.hclk / 1e6:g} MHz, APB1 at {clocks.pclk1 / 1e6:g} MHz")
@@ -275,7 +278,6 @@ class Board:
         """The processor stands still; the rest of the world does not."""
         self.usart.advance()
         self.time.now += self.time.cycles(seconds)
-        self.usart.excuse()
         self.usart.advance()
         self.time.due = self.time.now
 
@@ -353,7 +355,8 @@ class Board:
                 self._busy()
                 self.flash.finish()
                 self.interrupts += 1
-                self.cpu.enter(FIRST_INTERRUPT + USART2)
+                self.core.asked &= ~(1 << DMA1_STREAM6)
+                self.cpu.enter(FIRST_INTERRUPT + DMA1_STREAM6)
                 self._patience = 1
             else:
                 # Interrupts are off, or one is running. The longer it lasts, the rarer it is looked at.
@@ -368,7 +371,7 @@ class Board:
             if self.ports[port].function(pin) != function:
                 self.rules.breach("pin-function", f"P{port}{pin} is not {name}")
 
-    def _before_sending(self):
+    def _before_byte(self):
         self._busy()
         if not self._pins_checked:
             self._pins_checked = True

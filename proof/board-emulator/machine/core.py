@@ -4,7 +4,7 @@ from .bus import Registers
 
 CYCCNT_CONTROL, CYCCNT, DEMCR = 0x1000, 0x1004, 0xEDFC
 SYST_CSR, SYST_RVR, SYST_CVR = 0xE010, 0xE014, 0xE018
-ISER, ICER = 0xE100, 0xE180
+ISER, ICER, ISPR = 0xE100, 0xE180, 0xE200
 AIRCR, AIRCR_KEY, SYSRESETREQ = 0xED0C, 0x5FA, 1 << 2
 ENABLE, CLKSOURCE, COUNTFLAG = 1 << 0, 1 << 2, 1 << 16
 TRACE_ON = 1 << 24
@@ -16,8 +16,8 @@ class Core(Registers):
     def __init__(self, time, rules, wait, reset):
         super().__init__()
         self._time, self._rules, self._wait, self._reset = time, rules, wait, reset
-        #: Enabled interrupts, a bit each.
-        self.enabled = 0
+        #: Enabled interrupts, and those that the program asks for, a bit each.
+        self.enabled = self.asked = 0
         self._tick_start, self._tick_pending = 0, False
         self._cycles_offset = 0
 
@@ -66,6 +66,9 @@ class Core(Registers):
             self._time.due = self._time.now
         elif ICER <= offset < ICER + 0x20:
             self.enabled &= ~(value << 8 * (offset - ICER))
+        elif ISPR <= offset < ISPR + 0x20:
+            self.asked |= value << 8 * (offset - ISPR)
+            self._time.due = self._time.now
         elif offset == AIRCR:
             if value >> 16 != AIRCR_KEY:
                 self._rules.breach("reset-key")

@@ -1,4 +1,4 @@
-"""DMA2: streams between memory and registers (RM0390, chapter 9)."""
+"""DMA1 and DMA2: streams between memory and registers (RM0390, chapter 9)."""
 
 from .bus import Registers
 from .cpu import SRAM, SRAM_BYTES
@@ -6,9 +6,9 @@ from .rules import Fault
 
 LISR, LIFCR, FIRST_STREAM, STREAM_BYTES = 0x00, 0x08, 0x10, 0x18
 CR, NDTR, PAR, M0AR = 0x00, 0x04, 0x08, 0x0C
-EN, FROM_MEMORY, MEMORY_COUNTS = 1 << 0, 1 << 6, 1 << 10
-#: Fields of the control register that are modelled with any value: priority, channel, and interrupts of none.
-ANY = EN | FROM_MEMORY | MEMORY_COUNTS | 3 << 11 | 3 << 13 | 3 << 16 | 7 << 25
+EN, TCIE, FROM_MEMORY, CIRC, MEMORY_COUNTS = 1 << 0, 1 << 4, 1 << 6, 1 << 8, 1 << 10
+#: Fields of the control register that are modelled with any value: those above, sizes, priority and channel.
+ANY = EN | TCIE | FROM_MEMORY | CIRC | MEMORY_COUNTS | 3 << 11 | 3 << 13 | 3 << 16 | 7 << 25
 COMPLETE, HALF = 1 << 5, 1 << 4
 #: Where the flags of a stream stand among those of its four.
 FLAG_PLACES = (0, 6, 16, 22)
@@ -17,12 +17,13 @@ STREAMS = 8
 
 class Dma(Registers):
     """Streams. `register(address, value, cycle)` takes what DMA writes to a register; `advance` is called before an access,
-    `seen` when the program looks at the flags and a transfer has ended since.
+    `seen` when the program looks at the flags and a transfer has ended since, `started` when it has started a stream.
     """
 
-    def __init__(self, uc, rules, advance, register, seen):
+    def __init__(self, uc, rules, advance, register, seen=lambda: None, started=lambda: None):
         super().__init__()
-        self._uc, self._rules, self._advance, self._register, self._seen = uc, rules, advance, register, seen
+        self._uc, self._rules, self._advance, self._register = uc, rules, advance, register
+        self._seen, self._started = seen, started
         #: Streams that move nothing: a fault.
         self.stalled = set()
         #: Whether a transfer has ended that the program has not seen.
@@ -66,13 +67,20 @@ class Dma(Registers):
             raise Fault(f"DMA stream {stream} has a mode that is not modelled: {control:#x}")
         if self.flags[stream]:
             self._rules.breach("dma-flags", f"stream {stream}: {self.flags[stream]:06b}")
-        self._left[stream] = self._stream(stream, NDTR)
-        self._place[stream] = self._stream(stream, M0AR)
+        self._rewind(stream)
         items = self._left[stream] if control & MEMORY_COUNTS else 1
         end = self._place[stream] + items * (1 << (control >> 11 & 3))
         if not SRAM <= self._place[stream] < end <= SRAM + SRAM_BYTES:
             self._rules.breach("dma-place", f"stream {stream}: {self._place[stream]:#x} to {end:#x}")
             self.values[FIRST_STREAM + STREAM_BYTES * stream + CR] &= ~EN
+        self._started()
+
+    def _rewind(self, stream):
+        self._left[stream], self._place[stream] = self._stream(stream, NDTR), self._stream(stream, M0AR)
+
+    def interrupt(self, stream):
+        """Whether a stream asks for its interrupt."""
+        return bool(self._stream(stream, CR) & TCIE and self.flags[stream] & COMPLETE)
 
     def _serves(self, stream, channel):
         control = self._stream(stream, CR)
@@ -83,31 +91,37 @@ class Dma(Registers):
         if not self._left[stream]:
             self._news = True
             self.flags[stream] |= COMPLETE | HALF
+            if self._stream(stream, CR) & CIRC:
+                self._rewind(stream)
+                return
             self.values[FIRST_STREAM + STREAM_BYTES * stream + CR] &= ~EN
 
-    def to_register(self, stream, channel, cycle):
-        """A request for the next word from memory."""
+    def to_register(self, stream, channel, cycle, size=4):
+        """A request for the next item of so many bytes from memory. Returns whether there was one."""
         if not self._serves(stream, channel):
-            return
+            return False
         control = self._stream(stream, CR)
-        if not control & FROM_MEMORY or control >> 11 & 3 != 2:
-            raise Fault(f"DMA stream {stream} writes to memory, or no words")
-        word = int.from_bytes(self._uc.mem_read(self._place[stream], 4), "little")
-        self._place[stream] += 4 if control & MEMORY_COUNTS else 0
+        if not control & FROM_MEMORY or 1 << (control >> 11 & 3) != size:
+            raise Fault(f"DMA stream {stream} writes to memory, or not {size} bytes at once")
+        item = int.from_bytes(self._uc.mem_read(self._place[stream], size), "little")
+        self._place[stream] += size if control & MEMORY_COUNTS else 0
         self._count(stream, 1)
-        self._register(self._stream(stream, PAR), word, cycle)
+        self._register(self._stream(stream, PAR), item, cycle)
+        return True
 
-    def to_memory(self, stream, channel, address, numbers):
-        """Requests for these half-words to be taken from the register at `address`, one by one. Returns how many were."""
+    def to_memory(self, stream, channel, address, numbers, size=2):
+        """Requests for these numbers of so many bytes to be taken from the register at `address`, one by one. Returns how many
+        were.
+        """
         if not self._serves(stream, channel):
             return 0
         control = self._stream(stream, CR)
-        if control & FROM_MEMORY or control >> 11 & 3 != 1 or self._stream(stream, PAR) != address:
-            raise Fault(f"DMA stream {stream} reads from memory, no half-words, or another register")
+        if control & FROM_MEMORY or 1 << (control >> 11 & 3) != size or self._stream(stream, PAR) != address:
+            raise Fault(f"DMA stream {stream} reads from memory, not {size} bytes at once, or another register")
         taken = min(len(numbers), self._left[stream])
         if not control & MEMORY_COUNTS:
             raise Fault(f"DMA stream {stream} writes to one place in memory")
-        data = b"".join(number.to_bytes(2, "little") for number in numbers[:taken])
+        data = b"".join(number.to_bytes(size, "little") for number in numbers[:taken])
         self._uc.mem_write(self._place[stream], data)
         self._place[stream] += len(data)
         self._count(stream, taken)
