@@ -164,39 +164,43 @@ fn the_chosen_point_is_the_cheapest_and_its_blob_is_what_the_table_says() {
 #[test]
 fn choice_and_knee_are_those_worked_out_by_hand() {
     let mut trade = traded().1.clone();
-    trade.points.truncate(5);
-    // Time, cycles, flash and error; the fourth is as good and as fast as the second, and has fewer cycles; the last is off
-    // the front.
+    trade.points.truncate(6);
+    // Time, cycles, flash and error; the fifth is as good and as fast as the second, and has fewer cycles; the last two
+    // are off the front.
     let rows = [
         (1.0, 50.0, 500.0, 0.4),
         (2.0, 40.0, 400.0, 0.11),
         (100.0, 30.0, 300.0, 0.1),
+        (50.0, 35.0, 350.0, 0.105),
         (2.0, 30.0, 900.0, 0.11),
         (0.5, 90.0, 900.0, 0.3),
     ];
     for (i, (point, (ms, cycles, bytes, rmse))) in trade.points.iter_mut().zip(rows).enumerate() {
         (point.times.frame_ms, point.cycles, point.blob_bytes) =
             (ms, cycles as u64, bytes as usize);
-        point.on_front = i < 3;
+        point.on_front = i < 4;
         point.blocks.clear();
         let results = [("frame_ms", ms), ("cycles", cycles), ("blob_bytes", bytes)];
         let results = results.into_iter().chain([("rmse_dz_mm", rmse), ("linear_rmse_dz_mm", 1.0)]);
         point.results = results.map(|(name, value)| (name.to_owned(), value)).collect();
     }
-    assert_eq!((trade.front(), trade.most_accurate()), (vec![0, 1, 2], Some(2)));
-    // ln(4/1.1)/ln 4 of the gain in error, for ln 2/ln 100 of the time.
+    assert_eq!((trade.front(), trade.most_accurate()), (vec![0, 1, 3, 2], Some(2)));
+    // ln(4/1.1)/ln 4 of the gain in error for ln 2/ln 100 of the time, and ln(4/1.05)/ln 4 for ln 50/ln 100.
     assert_eq!(trade.knee(), Some(1));
-    assert_eq!([1.05, 1.1001, 5.0].map(|it| trade.fastest_within(it)), [2, 1, 0].map(Some));
+    assert_eq!(
+        [1.02, 1.06, 1.1001, 5.0].map(|it| trade.fastest_within(it)),
+        [2, 3, 1, 0].map(Some)
+    );
     let mut chosen = |bounds: &[(&str, Bound)]| {
         let bounds = bounds.iter().map(|(name, bound)| ((*name).to_owned(), *bound)).collect();
         trade.choose(&bounds).unwrap();
         trade.chosen.unwrap()
     };
-    assert_eq!(chosen(&[("rmse_dz_mm", Most(0.11))]), 3);
-    assert_eq!(chosen(&[("rmse_dz_mm", Most(0.109))]), 2);
+    assert_eq!(chosen(&[("rmse_dz_mm", Most(0.11))]), 4);
+    assert_eq!(chosen(&[("rmse_dz_mm", Most(0.109))]), 3);
     assert_eq!(chosen(&[("rmse_dz_mm", Most(0.11)), ("blob_bytes", Most(400.0))]), 1);
-    assert_eq!(chosen(&[("frame_ms", Most(99.0))]), 3);
-    assert_eq!(chosen(&[("frame_ms", Most(1.0)), ("cycles", Least { least: 60.0 })]), 4);
+    assert_eq!(chosen(&[("frame_ms", Most(49.0))]), 4);
+    assert_eq!(chosen(&[("frame_ms", Most(1.0)), ("cycles", Least { least: 60.0 })]), 5);
     // A blob fits a slot, unless another bound on it is given.
     trade.points[2].results.insert("blob_bytes".into(), 131_073.0);
     assert!(trade.choose(&at_most("rmse_dz_mm", 0.1)).is_err());
