@@ -6,8 +6,8 @@ use stm32f4xx_hal::pac::dma2::ST;
 
 /// Fields of a stream's control register: enabled; from memory; memory address counts up; and the highest priority.
 const ENABLED: u32 = 1 << 0;
-pub(crate) const FROM_MEMORY: u32 = 1 << 6;
-pub(crate) const COUNT_UP: u32 = 1 << 10;
+pub const FROM_MEMORY: u32 = 1 << 6;
+pub const COUNT_UP: u32 = 1 << 10;
 const FIRST: u32 = 3 << 16;
 
 /// Starts a stream of so many `items` between memory and a register, with these fields.
@@ -16,18 +16,12 @@ const FIRST: u32 = 3 << 16;
 ///
 /// The addresses are of memory with room for the items, which nobody else uses until the stream has ended, and of a
 /// register.
-pub(crate) unsafe fn start_stream(
-    stream: &ST,
-    memory: usize,
-    register: usize,
-    items: usize,
-    fields: u32,
-) {
+pub unsafe fn start<M>(stream: &ST, memory: *const M, register: usize, items: usize, fields: u32) {
     fence(Ordering::SeqCst); // what was written is there before DMA reads
     // SAFETY: as above.
     unsafe {
         stream.par().write(|w| w.bits(register as u32));
-        stream.m0ar().write(|w| w.bits(memory as u32));
+        stream.m0ar().write(|w| w.bits(memory.expose_provenance() as u32));
         stream.ndtr().write(|w| w.bits(items as u32));
         stream.cr().write(|w| w.bits(fields | FIRST));
         stream.cr().write(|w| w.bits(fields | FIRST | ENABLED));

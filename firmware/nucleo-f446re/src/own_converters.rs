@@ -26,7 +26,7 @@ use taxel_firmware::timing::{
     ONCHIP_COLUMNS, ONCHIP_ROWS, ONCHIP_SAMPLES, ONCHIP_TRIGGER_TICKS, RowCounts,
 };
 
-use crate::dma::{COUNT_UP, FROM_MEMORY, start_stream};
+use crate::dma::{self, COUNT_UP, FROM_MEMORY};
 
 /// Number of columns.
 pub const COLUMNS: usize = ONCHIP_COLUMNS as usize;
@@ -199,13 +199,6 @@ impl Sequencer<COLUMNS> for OwnConverters {
             *word = row.map_or(REST, row_word);
         }
         let numbers = lines * COLUMNS * usize::from(self.samples);
-        let [rows, select, rest] = [
-            &raw const memory.rows,
-            (&raw const memory.select).cast(),
-            (&raw const memory.rest).cast(),
-        ]
-        .map(<*const _>::expose_provenance);
-        let to = (&raw mut memory.numbers).expose_provenance();
         let changes = GPIOB::PTR.addr() + 0x18;
         let number = ADC_COMMON::PTR.addr() + 0x08;
         // SAFETY: writing ones clears these flags.
@@ -217,10 +210,10 @@ impl Sequencer<COLUMNS> for OwnConverters {
         let fields = OF_TIMER_1 | FROM_MEMORY | WORDS;
         // SAFETY: the addresses are of `MEMORY` and of registers, and the items are as many as there is room for.
         unsafe {
-            start_stream(of_numbers, to, number, numbers, HALF_WORDS | COUNT_UP);
-            start_stream(of_rows, rows, changes, lines, fields | COUNT_UP);
-            start_stream(of_switch, select, changes, lines, fields);
-            start_stream(of_end, rest, changes, 1, fields);
+            dma::start(of_numbers, &raw mut memory.numbers, number, numbers, HALF_WORDS | COUNT_UP);
+            dma::start(of_rows, &raw const memory.rows, changes, lines, fields | COUNT_UP);
+            dma::start(of_switch, &raw const memory.select, changes, lines, fields);
+            dma::start(of_end, &raw const memory.rest, changes, 1, fields);
         }
         let (rows, triggers) = &self.timers;
         // SAFETY: all are counts or the fields that their constants tell.

@@ -5,20 +5,18 @@
 //! decoded, which may take milliseconds.
 
 use core::cell::UnsafeCell;
-use core::iter;
 use core::sync::atomic::{AtomicU8, Ordering, fence};
 
-use cortex_m::asm;
 use cortex_m::peripheral::NVIC;
 use heapless::Vec;
 use heapless::spsc::{Consumer, Producer, Queue};
 use stm32f4xx_hal::gpio::{PA2, PA3};
 use stm32f4xx_hal::pac::{DMA1, Interrupt, USART2, interrupt};
 use stm32f4xx_hal::prelude::*;
-use stm32f4xx_hal::rcc::Rcc;
+use stm32f4xx_hal::rcc::{Enable, Rcc};
 use stm32f4xx_hal::serial::config::{Config, DmaConfig};
 
-use crate::dma::{COUNT_UP, FROM_MEMORY, start_stream};
+use crate::dma::{self, COUNT_UP, FROM_MEMORY};
 
 /// Baud rate; 8 data bits, no parity, 1 stop bit. `TAXEL_BAUD=115200` in the environment of the build sets another.
 pub const BAUD: u32 = match option_env!("TAXEL_BAUD") {
@@ -33,9 +31,6 @@ pub const BAUD: u32 = match option_env!("TAXEL_BAUD") {
 /// full: what a host sends beyond, without an answer, takes the place of older bytes. The link's checksum detects that.
 const ROOM: usize = 1024;
 
-/// Most bytes that DMA sends between two interrupts.
-const PIECE: usize = 128;
-
 /// Streams of DMA1 for what is received and sent, and the field that chooses USART2's requests.
 const RECEIVED: usize = 5;
 const SENT: usize = 6;
@@ -43,28 +38,19 @@ const OF_USART_2: u32 = 4 << 25;
 
 /// Fields of a stream's control register: an interrupt at the end; and from the end to the start again.
 const INTERRUPT: u32 = 1 << 4;
-const RING: u32 = 1 << 8;
+const CIRCULAR: u32 = 1 << 8;
 
-/// The flags of the stream that sends.
-const SENT_FLAGS: u32 = 0x3D << 16;
+/// The ring of received bytes, which DMA writes.
+static RING: [AtomicU8; ROOM] = [const { AtomicU8::new(0) }; ROOM];
 
-/// All of the port's status but "all sent", which DMA does not clear.
-const BUT_COMPLETE: u16 = !(1 << 6);
-
-/// Bytes to send: those that wait, and those that DMA sends.
-struct Sending {
-    waiting: Consumer<'static, u8>,
-    piece: Vec<u8, PIECE>,
-}
-
-/// A place that is filled before the interrupt is enabled, and then belongs to it.
-struct OfInterrupt(UnsafeCell<Option<Sending>>);
+/// The end of the queue that is filled before the interrupt is enabled, and then belongs to it.
+struct OfInterrupt(UnsafeCell<Option<Consumer<'static, u8>>>);
 
 // SAFETY: `Serial::start` fills the place once, and from then on only the interrupt uses it, which does not interrupt
 // itself.
 unsafe impl Sync for OfInterrupt {}
 
-static SENDING: OfInterrupt = OfInterrupt(UnsafeCell::new(None));
+static WAITING: OfInterrupt = OfInterrupt(UnsafeCell::new(None));
 
 /// The registers of the port and of DMA.
 fn registers() -> (USART2, DMA1) {
@@ -75,7 +61,6 @@ fn registers() -> (USART2, DMA1) {
 /// The serial line, in both directions. No function waits.
 pub struct Serial {
     dma: DMA1,
-    received: &'static [AtomicU8; ROOM],
     /// Place of the next byte to read.
     next: usize,
     to_send: Producer<'static, u8>,
@@ -83,24 +68,20 @@ pub struct Serial {
 
 impl Serial {
     pub(crate) fn start(usart: USART2, dma: DMA1, pins: (PA2, PA3), rcc: &mut Rcc) -> Option<Self> {
-        let received =
-            cortex_m::singleton!(: [AtomicU8; ROOM] = [const { AtomicU8::new(0) }; ROOM])?;
         let queue = cortex_m::singleton!(: Queue<u8, ROOM> = Queue::new())?;
         let (to_send, waiting) = queue.split();
         let config = Config::default().baudrate(BAUD.bps()).dma(DmaConfig::TxRx);
         usart.serial::<u8>(pins, config, rcc).ok()?;
-        rcc.ahb1enr().modify(|_, w| w.dma1en().set_bit());
-        asm::dsb(); // a write that follows at once may be lost (ES0298)
-        let ring = received.as_ptr().expose_provenance();
-        let fields = OF_USART_2 | COUNT_UP | RING;
-        // SAFETY: the ring is static, and atomic as others write it. The singletons above exist once, so this is reached
-        // once, and the interrupt is still disabled. No critical section depends on its mask.
+        DMA1::enable(rcc);
+        let fields = OF_USART_2 | COUNT_UP | CIRCULAR;
+        // SAFETY: the ring is atomic, as others write it. The singleton above exists once, so this is reached once, and the
+        // interrupt is still disabled. No critical section depends on its mask.
         unsafe {
-            start_stream(dma.st(RECEIVED), ring, data(), ROOM, fields);
-            *SENDING.0.get() = Some(Sending { waiting, piece: Vec::new() });
+            dma::start(dma.st(RECEIVED), &raw const RING, data(), ROOM, fields);
+            *WAITING.0.get() = Some(waiting);
             NVIC::unmask(Interrupt::DMA1_STREAM6);
         }
-        Some(Self { dma, received, next: 0, to_send })
+        Some(Self { dma, next: 0, to_send })
     }
 
     /// The next byte received, or `None` if there is none yet.
@@ -110,7 +91,7 @@ impl Serial {
             return None;
         }
         fence(Ordering::SeqCst); // nothing is read before that
-        let byte = self.received.get(self.next)?.load(Ordering::Relaxed);
+        let byte = RING.get(self.next)?.load(Ordering::Relaxed);
         self.next = (self.next + 1) % ROOM;
         Some(byte)
     }
@@ -144,25 +125,27 @@ fn is_sending() -> bool {
 /// Begins the next piece of what waits, if DMA has sent the one before.
 #[interrupt]
 fn DMA1_STREAM6() {
+    static mut PIECE: Vec<u8, 128> = Vec::new();
     // SAFETY: only this interrupt uses the place.
-    let Some(Sending { waiting, piece }) = (unsafe { &mut *SENDING.0.get() }) else { return };
+    let Some(waiting) = (unsafe { &mut *WAITING.0.get() }) else { return };
     if is_sending() {
         return;
     }
-    piece.clear();
-    for byte in iter::from_fn(|| waiting.dequeue()).take(PIECE) {
-        let _ = piece.push(byte);
+    PIECE.clear();
+    while !PIECE.is_full()
+        && let Some(byte) = waiting.dequeue()
+    {
+        let _ = PIECE.push(byte);
     }
     let (usart, dma) = registers();
-    // SAFETY: writing ones clears DMA's flags and leaves the port's, and DMA has ended. The piece stays as it is until it has
-    // ended again.
+    // SAFETY: writing ones clears the flags of DMA, and leaves those of the port: only "all sent" is cleared, which DMA does
+    // not. The piece stays as it is until DMA has ended.
     unsafe {
-        dma.hifcr().write(|w| w.bits(SENT_FLAGS));
-        if !piece.is_empty() {
-            usart.sr().write(|w| w.bits(BUT_COMPLETE));
-            let from = piece.as_ptr().expose_provenance();
+        dma.hifcr().write(|w| w.bits(0x3D << 16));
+        if !PIECE.is_empty() {
+            usart.sr().write(|w| w.bits(!(1 << 6)));
             let fields = OF_USART_2 | FROM_MEMORY | COUNT_UP | INTERRUPT;
-            start_stream(dma.st(SENT), from, data(), piece.len(), fields);
+            dma::start(dma.st(SENT), PIECE.as_ptr(), data(), PIECE.len(), fields);
         }
     }
 }
