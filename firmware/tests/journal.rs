@@ -25,16 +25,10 @@ fn with_constants() -> Journal<Flash> {
     journal
 }
 
-/// Places of the items in a page that begin with these bytes behind their mark.
-fn items(page: &[u8], head: &[u8]) -> Vec<usize> {
-    let is_item = |place: &usize| {
-        page[*place..].strip_prefix(b"ITEM").is_some_and(|rest| rest.starts_with(head))
-    };
-    (0..PAGE_BYTES).step_by(32).filter(is_item).collect()
-}
-
+/// Places of the start items in a page.
 fn starts(page: &[u8]) -> Vec<usize> {
-    items(page, b"\xFF\0\x04\0")
+    let places = (0..PAGE_BYTES).step_by(32);
+    places.filter(|place| page[*place..].starts_with(b"ITEM\xFF\0\x04\0")).collect()
 }
 
 #[test]

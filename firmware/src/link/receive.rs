@@ -85,9 +85,11 @@ mod tests {
     }
 
     #[test]
-    fn frames_arrive_one_by_one_with_any_number_of_zeros_between() {
+    fn frames_arrive_one_by_one_and_what_is_too_long_or_cut_is_told() {
         let stream = [frame(&[1, 2]), vec![0, 0], frame(&[0, 0, 0, 4]), frame(&[])].concat();
         assert_eq!(received(&stream), [Ok(vec![1, 2]), Ok(vec![0, 0, 0, 4]), Ok(vec![])]);
+        let stream = [frame(&[1; 5]), vec![3, 1, 0], frame(&[7; 4])].concat();
+        assert_eq!(received(&stream), [Err("too long"), Err("broken"), Ok(vec![7; 4])]);
     }
 
     #[test]
@@ -98,11 +100,5 @@ mod tests {
             assert_eq!(found.last(), Some(&Ok(vec![2, 3])), "{rubbish:?}");
             assert!(found.len() <= 2, "{rubbish:?}: {found:?}");
         }
-    }
-
-    #[test]
-    fn what_is_too_long_or_cut_is_told() {
-        let stream = [frame(&[1; 5]), vec![3, 1, 0], frame(&[7; 4])].concat();
-        assert_eq!(received(&stream), [Err("too long"), Err("broken"), Ok(vec![7; 4])]);
     }
 }
