@@ -146,8 +146,9 @@ fn once_an_upload_has_begun_there_is_no_way_back_even_if_it_sends_the_same_bytes
     bench.install(&old).unwrap();
     bench.install(&new()).unwrap();
     let steps = trial_steps(&old);
-    bench.upload(&steps[..steps.len() - 1]).unwrap();
-    assert_eq!(bench.session().undo(crc_of(&new())).0, Err(Refusal::NothingToUndo));
+    let mut host = bench.session();
+    host.upload(&steps[..steps.len() - 1]).0.unwrap();
+    assert_eq!(host.undo(crc_of(&new())).0, Err(Refusal::NothingToUndo));
     assert_eq!(after_restart(&mut bench).unwrap().crc_32, crc_of(&new()));
 }
 
@@ -162,4 +163,16 @@ fn an_upload_that_could_not_begin_leaves_the_way_back() {
     supply.borrow_mut().on(None);
     assert_eq!(host.statistics().slot_erases, erases);
     assert_eq!(host.undo(crc_of(&new())).0, Ok(confirmed(&old())));
+}
+
+#[test]
+fn an_upload_that_cannot_be_written_down_ends() {
+    let mut bench = Bench::new(quiet(), &old());
+    let (new, supply) = (new(), bench.slots[1].supply());
+    let (mut host, steps) = (bench.session(), trial_steps(&new));
+    host.upload(&steps[..2]).0.unwrap();
+    supply.borrow_mut().on(Some(0));
+    assert_eq!(host.upload(&steps[2..3]).0, Err(Refusal::Flash));
+    supply.borrow_mut().on(None);
+    assert_eq!(host.upload(&steps[2..3]).0, Err(Refusal::NoUpload));
 }

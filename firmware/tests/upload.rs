@@ -129,6 +129,8 @@ fn each_fault_of_a_model_is_named() {
     let mut corrupt = old.clone();
     corrupt[40] ^= 1;
     let truncated = &old[..old.len() - 4];
+    let mut odd = old[..18].to_vec();
+    odd[5..9].copy_from_slice(&18_u32.to_le_bytes());
     let received = |bytes: usize| Refusal::OutOfPlace { received: bytes as u32 };
     let whole_chunks = old.len() / CHUNK * CHUNK;
     for (blob, refusal) in [
@@ -136,6 +138,7 @@ fn each_fault_of_a_model_is_named() {
         (truncated, received(truncated.len())),
         (&[&old[..], &[0; 4]].concat(), received(whole_chunks)),
         (&corrupt, Refusal::BadModel(ModelFault::Corrupt)),
+        (&odd, Refusal::BadModel(ModelFault::Corrupt)), // its end is no whole word
     ] {
         assert_eq!(host.upload(&trial_steps(blob)).0, Err(refusal));
     }
@@ -145,6 +148,7 @@ fn each_fault_of_a_model_is_named() {
     let mut steps = trial_steps(&longer);
     steps[0] = begin(&old);
     assert_eq!(host.upload(&steps).0, Err(Refusal::BadModel(ModelFault::Length)));
+    assert_eq!(host.upload(&[TRY]).0, Err(Refusal::NoUpload));
     assert_eq!(host.model_crc(), Some(crc_of(&old)));
 }
 

@@ -335,12 +335,22 @@ fn idle_columns_are_sampled_once_a_round_and_after_whatever_changes_them() {
     // every round from there on.
     let part = Selection { columns: ColumnWires(0b101), ..WIRES };
     for scan in 0..48 {
-        let expected = match scan {
-            0 => 3 + 2 * 3,
-            16 | 32 => 3 + 3 + 2,
-            _ => 2 * 2,
+        let (expected, turn) = match scan {
+            0 => (3 + 2 * 3, Some("r1")),
+            16 => (3 + 3 + 2, Some("r1")),
+            32 => (3 + 3 + 2, Some("r0")),
+            _ => (2 * 2, None),
         };
+        record.take();
         assert_eq!(samples(&mut scanner, once, part), expected, "scan {scan} of a part");
+        // The row that was driven when the column between them was sampled last.
+        let (events, between) = (record.take(), Event::Transfer(0, vec![0x06, 1 << 6, 0]));
+        let sampled = events.iter().rposition(|event| *event == between).unwrap_or(0);
+        let driven = events[..sampled].iter().rev().find_map(|event| match event {
+            Event::Pin(row, true) => Some(*row),
+            _ => None,
+        });
+        assert_eq!(driven, turn, "scan {scan} of a part");
     }
 }
 

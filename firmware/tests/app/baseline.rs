@@ -36,6 +36,9 @@ fn a_baseline_is_captured_and_contact_is_told_against_it() {
         assert!(!contact(&mut host, 40.0) && !contact(&mut host, 64.0));
         host.pass(1_000_000);
     }
+    // Nor once that is given up.
+    host.configure(quiet());
+    assert!(!contact(&mut host, 40.0));
 }
 
 #[test]

@@ -43,9 +43,11 @@ fn a_model_with_a_reading_model_decodes_rows_with_a_faulty_reading_and_tells_of_
 }
 
 #[test]
-fn without_a_model_or_with_a_frame_of_another_length_the_answer_says_so() {
+fn without_a_model_without_outputs_or_with_a_frame_of_another_length_the_answer_says_so() {
     let found = decode(&mut started(quiet(), &[]), &frame_at_rest());
     assert_eq!(found, (EstimateReport::NO_MODEL, vec![1, 1], vec![]));
+    let (flags, ..) = decode(&mut started(quiet(), &blob(OVERFLOWING, 4)), &frame_at_rest());
+    assert_eq!(flags, EstimateReport::OVERFLOW);
     let mut host = started(quiet(), &blob(3, 4));
     for readings in [&[60.0; 5][..], &[60.0; 7], &[]] {
         let readings_ohm = Floats::new(readings);

@@ -44,39 +44,29 @@ fn a_scan_longer_than_the_period_is_an_overrun() {
 #[test]
 fn the_watchdog_is_fed_by_good_loops_only() {
     let mut host = started(every(100), &blob(3, 4));
-    let board = host.board.clone();
-    let feeds = || board.pins.borrow().feeds;
-    let await_scan = |host: &mut Host<'_, '_>| {
-        let scanned = host.statistics().frames_scanned;
-        while host.statistics().frames_scanned == scanned {
-            host.step();
-        }
+    let fed = |host: &mut Host<'_, '_>, turns: u32| {
+        let before = host.pins().feeds;
+        host.turn(turns);
+        host.pins().feeds - before
     };
     for _ in 0..50 {
-        let before = feeds();
-        host.step();
-        assert_eq!(feeds(), before + 1);
+        assert_eq!(fed(&mut host, 1), 1);
     }
     // With a converter that gives nothing, no loop is good from the next scan on, whether it scans or not.
     *host.frame() = [[f32::NAN; COLS]; ROWS];
-    await_scan(&mut host);
-    let (fed, bad) = (feeds(), host.statistics().bad_loops);
-    host.turn(2000);
-    assert_eq!(feeds(), fed);
+    host.run_for(200);
+    let bad = host.statistics().bad_loops;
+    assert_eq!(fed(&mut host, 2000), 0);
     assert!(host.statistics().bad_loops >= bad + 2000);
     // One reading is enough.
     host.frame()[1][1] = 60.0;
-    await_scan(&mut host);
-    let fed = feeds();
-    host.turn(2000);
-    assert_eq!(feeds(), fed + 2000);
+    host.run_for(200);
+    assert_eq!(fed(&mut host, 2000), 2000);
     // Without scans, a silent sensor must not restart the device.
     *host.frame() = [[f32::NAN; COLS]; ROWS];
     host.turn(2000);
     host.configure(quiet());
-    let fed = feeds();
-    host.step();
-    assert_eq!(feeds(), fed + 1);
+    assert_eq!(fed(&mut host, 1), 1);
 }
 
 /// Longest time in µs in which the watchdog is not fed, when a byte is taken every `gap_us` and each scan takes
@@ -86,6 +76,7 @@ fn longest_unfed_us(gap_us: u32, scan_us: u32) -> u32 {
     let mut host = started(scanning, &blob(3, 4));
     host.pins_mut().scan_us = scan_us;
     host.pins_mut().gap_us = gap_us;
+    host.pins_mut().look_us = 20;
     // A faulty reading, so that all kinds of reports are sent.
     host.frame()[0][0] = f32::NAN;
     let mut longest_us = 0;
@@ -121,6 +112,13 @@ fn a_host_that_takes_no_bytes_costs_a_report_but_not_the_device() {
     assert_eq!(host.find(|number, _| Some(number)), Some(7));
     let s = host.statistics();
     assert!(s.lost_reports >= 5 && s.frames_missed > 0, "{s:?}");
+    // One that takes them slowly costs none, however long it lasts.
+    host.configure(every(1_000_000));
+    host.pins_mut().look_us = 100;
+    host.pins_mut().gap_us = 5_000;
+    host.run_for(10_000_000);
+    host.pins_mut().gap_us = 0;
+    assert_eq!(host.statistics().lost_reports, s.lost_reports);
 }
 
 #[test]

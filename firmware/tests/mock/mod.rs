@@ -20,5 +20,5 @@ pub use flash::{Flash, Supply};
 pub(crate) use host::answer;
 pub use host::{CHUNK, Host, TRY, begin, framed, request_bytes, trial_steps};
 pub use models::{blob, blob_of_features, blob_with, blob_with_readings, crc_of};
-pub use row_model::{blob_of_a_row, blob_of_names};
+pub use row_model::{OVERFLOWING, blob_of_a_row, blob_of_names};
 pub use shape::{COLS, OUTPUTS, ROWS, TestFrame, frame_at_rest, frame_with};
