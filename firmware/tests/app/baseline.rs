@@ -43,7 +43,7 @@ fn a_baseline_is_captured_and_contact_is_told_against_it() {
 
 #[test]
 fn a_frame_without_a_baseline_is_flagged_until_one_is_complete() {
-    let mut host = started(quiet(), &blob_with(true, None));
+    let mut host = started(quiet(), &blob_of_changes());
     let read = |host: &mut Host<'_, '_>| {
         let (flags, status, _) = decode(host, &frame_at_rest());
         assert_eq!(flags & EstimateReport::NO_BASELINE != 0, status == [1, 1]);

@@ -29,8 +29,6 @@ pub struct Pins {
     /// Number of scans that it began so, and of those that were given up.
     pub started: u32,
     pub stopped: u32,
-    /// Whether it has a brown-out level, which can be set.
-    pub has_brown_out: bool,
     /// Number of times that the watchdog was fed.
     pub feeds: u32,
     /// Number of bytes that the host's side still takes; `None` takes all.
@@ -115,10 +113,6 @@ impl Storage for Board {
 
 impl Platform for Board {
     const BOARD: &'static str = "test";
-
-    fn set_brown_out(&mut self) -> bool {
-        self.pins.borrow().has_brown_out
-    }
 
     fn memory(&self) -> Memory {
         Memory { stack_reserved: 1024, ..Memory::default() }

@@ -14,10 +14,9 @@ pub fn blob(seed: usize, centres: usize) -> AlignedBytes {
     blob_of(seed, centres, false, None)
 }
 
-/// The blob of `blob(3, 4)` for readings relative to the baseline if `relative_inputs`, with a reading model of this block.
-pub fn blob_with(relative_inputs: bool, reading_model: Option<(Sizes, &[f32])>) -> AlignedBytes {
-    let made = reading_model.map(|(sizes, block)| ReadingModel::new(sizes, block).unwrap());
-    blob_of(3, 4, relative_inputs, made)
+/// The blob of `blob(3, 4)` for readings relative to the baseline.
+pub fn blob_of_changes() -> AlignedBytes {
+    blob_of(3, 4, true, None)
 }
 
 fn blob_of(
@@ -36,7 +35,8 @@ fn blob_of(
     })
 }
 
-/// [`blob_with`] a reading model whose one component is of frames near 62 Ω, or near the baseline.
+/// The blob of `blob(3, 4)` with a reading model, for readings relative to the baseline if `relative_inputs`. Its one component
+/// is of frames near 62 Ω, or near the baseline.
 pub fn blob_with_readings(relative_inputs: bool) -> AlignedBytes {
     let (readings, outputs) = (ROWS * COLS, ROWS * OUTPUTS);
     let [middle, scale] = if relative_inputs { [1.0, 20.0] } else { [62.0, 0.5] };
@@ -52,7 +52,7 @@ pub fn blob_with_readings(relative_inputs: bool) -> AlignedBytes {
     ]
     .concat();
     let sizes = Sizes { readings, factors: 1, components: 1, outputs };
-    blob_with(relative_inputs, Some((sizes, &block)))
+    blob_of(3, 4, relative_inputs, Some(ReadingModel::new(sizes, &block).unwrap()))
 }
 
 /// A blob of one network for both rows, behind a projection to so many `features`.
