@@ -1,7 +1,5 @@
 //! The application loop on a virtual board.
 
-pub mod requests;
-
 mod background;
 mod baseline;
 mod confidence;

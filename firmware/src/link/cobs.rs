@@ -126,17 +126,14 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn known_frames() {
+    fn frames_are_as_known_and_sending_stops_where_it_is_refused() {
         // Examples of the paper, and the usual corner cases at the longest run.
         let longest: Vec<u8> = (1..=254).collect();
         assert_eq!(frame_of(&[]), [1, 0]);
         assert_eq!(frame_of(&[0]), [1, 1, 0]);
         assert_eq!(frame_of(&[1, 2, 0, 3]), [3, 1, 2, 2, 3, 0]);
         assert_eq!(frame_of(&longest), [&[255][..], &longest, &[0]].concat());
-    }
-
-    #[test]
-    fn sending_stops_where_it_is_refused() {
+        // Sending stops where it is refused.
         let mut sent = 0;
         assert!(!encode(&[1, 2, 3], |_| {
             sent += 1;

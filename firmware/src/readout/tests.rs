@@ -389,6 +389,11 @@ fn a_scan_drives_only_the_rows_that_it_is_asked_for_and_reads_each_column_at_its
     events.retain(|event| matches!(event, Event::Transfer(..)));
     let asked = [1, 2, 0, 1, 2, 0].map(|column| Event::Transfer(0, vec![0x06, column << 6, 0]));
     assert_eq!(events, asked);
+    // Wires that a scanner does not have are missing.
+    let beyond = Selection { rows: &[RowWire(0)], columns: ColumnWires::first(4) };
+    let mut all = [7.0; 4];
+    assert_eq!(scanner.scan(once, beyond, &mut all).failed_samples, 4);
+    assert!(all.iter().all(|ohm| ohm.is_nan()), "{all:?}");
     let (idle, counts) = ([250.0, 251.0, 252.0], [2000.0, 2001.0, 2002.0]);
     let load = CIRCUIT.load(wires.columns, &idle, 4095, &counts);
     let mut expected = [2001.0, 2002.0];
@@ -396,13 +401,4 @@ fn a_scan_drives_only_the_rows_that_it_is_asked_for_and_reads_each_column_at_its
     CIRCUIT.row_ohm(row, &idle, 4095, &mut expected);
     CIRCUIT.correct(wires.columns, &mut expected);
     assert_eq!(frame, [expected[0], expected[1], 7.0]);
-}
-
-#[test]
-fn wires_that_a_scanner_does_not_have_are_missing() {
-    let (_, mut scanner) = scanner();
-    let mut frame = [7.0; 4];
-    let wires = Selection { rows: &[RowWire(0)], columns: ColumnWires::first(4) };
-    assert_eq!(scanner.scan(SETTINGS, wires, &mut frame).failed_samples, 4);
-    assert!(frame.iter().all(|ohm| ohm.is_nan()));
 }

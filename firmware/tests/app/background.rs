@@ -3,7 +3,6 @@
 use taxel_firmware::circuit::ZeroPotential;
 use taxel_firmware::link::message::{Configuration, Report, Request};
 
-use super::requests::decode;
 use crate::mock::*;
 
 /// A host of a device with a model, whose sensor scans by itself for `scan_us` and 10 µs.
@@ -91,7 +90,7 @@ fn a_scan_under_way_is_given_up_when_what_it_is_of_changes() {
     let stopped = host.pins().stopped;
     run_until_started(&mut host, 1);
     host.configure(slower);
-    decode(&mut host, &[[33.0; COLS]; ROWS]);
+    host.decode(&[[33.0; COLS]; ROWS]);
     assert!(readings(&host).is_empty());
     run_until_started(&mut host, 1);
     assert_eq!(readings(&host)[0].2.to_bits(), 72.0_f32.to_bits());

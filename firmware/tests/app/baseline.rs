@@ -3,8 +3,20 @@
 use taxel_core::blob::Floats;
 use taxel_firmware::link::message::{Configuration, EstimateReport, Refusal, Report, Request};
 
-use super::requests::{capture, decode};
 use crate::mock::*;
+
+/// Captures a baseline of `frames` scans, and returns the answer. Then sets a configuration that scans only on request.
+fn capture(host: &mut Host<'_, '_>, frames: u16) -> String {
+    host.configure(every(100));
+    host.send(9, &Request::CaptureBaseline { frames });
+    while host.answers(9).is_empty() {
+        assert_eq!(host.step(), None);
+        assert!(host.pins().now_us < 1_000_000, "no answer");
+    }
+    let answer = host.answers(9).remove(0);
+    host.configure(quiet());
+    answer
+}
 
 #[test]
 fn a_baseline_is_captured_and_contact_is_told_against_it() {
@@ -45,7 +57,7 @@ fn a_baseline_is_captured_and_contact_is_told_against_it() {
 fn a_frame_without_a_baseline_is_flagged_until_one_is_complete() {
     let mut host = started(quiet(), &blob_of_changes());
     let read = |host: &mut Host<'_, '_>| {
-        let (flags, status, _) = decode(host, &frame_at_rest());
+        let (flags, status, _) = host.decode(&frame_at_rest());
         assert_eq!(flags & EstimateReport::NO_BASELINE != 0, status == [1, 1]);
         status
     };

@@ -4,7 +4,6 @@ use taxel_core::Decoder;
 use taxel_core::blob::Floats;
 use taxel_firmware::link::message::{EstimateReport, Refusal, Request};
 
-use super::requests::{decode, expected};
 use crate::mock::*;
 
 #[test]
@@ -13,7 +12,7 @@ fn a_faulty_reading_spoils_its_row_alone_and_is_told() {
     let mut host = started(quiet(), &blob);
     let good = expected(&blob, &frame_at_rest());
     for bad in [f32::NAN, 0.0, f32::INFINITY, 1.0, 2000.0, -60.0] {
-        let (flags, status, found) = decode(&mut host, &frame_with(0, 2, bad));
+        let (flags, status, found) = host.decode(&frame_with(0, 2, bad));
         assert_eq!((flags, &status[..]), (EstimateReport::FAULTY_READING, &[1, 0][..]), "{bad}");
         assert!(found[..OUTPUTS].iter().all(|value| f32::from_bits(*value).is_nan()));
         assert_eq!(found[OUTPUTS..], good[OUTPUTS..]);
@@ -29,20 +28,20 @@ fn a_reading_model_fills_one_faulty_reading_which_is_told() {
     assert_eq!(decoder.fill(filled.as_flattened_mut(), &[], &mut scratch), 1);
     let mut host = started(quiet(), &blob);
     let mut frame = frame_with(0, 2, 2000.0);
-    let (flags, status, found) = decode(&mut host, &frame);
+    let (flags, status, found) = host.decode(&frame);
     assert_ne!(flags & EstimateReport::FAULTY_READING, 0);
     assert_eq!((status, found), (vec![0, 0], expected(&blob, &filled)));
     // Two of six are too many.
     frame[1][0] = 2000.0;
-    let (flags, status, _) = decode(&mut host, &frame);
+    let (flags, status, _) = host.decode(&frame);
     assert_eq!((flags, &status[..]), (EstimateReport::FAULTY_READING, &[1, 1][..]));
 }
 
 #[test]
 fn without_a_model_without_outputs_or_with_a_frame_of_another_length_the_answer_says_so() {
-    let found = decode(&mut started(quiet(), &[]), &frame_at_rest());
+    let found = started(quiet(), &[]).decode(&frame_at_rest());
     assert_eq!(found, (EstimateReport::NO_MODEL, vec![1, 1], vec![]));
-    let (flags, ..) = decode(&mut started(quiet(), &blob(OVERFLOWING, 4)), &frame_at_rest());
+    let (flags, ..) = started(quiet(), &blob(OVERFLOWING, 4)).decode(&frame_at_rest());
     assert_eq!(flags, EstimateReport::OVERFLOW);
     let mut host = started(quiet(), &blob(3, 4));
     for readings in [&[60.0; 5][..], &[60.0; 7], &[]] {
@@ -59,7 +58,7 @@ fn readings_far_beyond_the_training_range_are_flagged_and_counted() {
     for (reading, clamped) in
         [(47.6, false), (72.4, false), (47.4, true), (72.6, true), (900.0, true)]
     {
-        let (flags, ..) = decode(&mut host, &frame_with(1, 2, reading));
+        let (flags, ..) = host.decode(&frame_with(1, 2, reading));
         assert_eq!(flags & EstimateReport::CLAMPED != 0, clamped, "{reading}");
     }
     assert_eq!(host.statistics().frames_clamped, 3);

@@ -6,7 +6,6 @@ use taxel_core::{Decoder, Estimate, RowStatus};
 use taxel_firmware::circuit::ZeroPotential;
 use taxel_firmware::link::message::{Configuration, Report, Request};
 
-use super::requests::{bits, expected};
 use crate::mock::*;
 
 /// A configuration that filters, and scans only on request.

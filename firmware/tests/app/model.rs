@@ -5,7 +5,6 @@ use taxel_core::blob::{Columns, Floats, Metadata, ModelShape};
 use taxel_core::checksum::CRC_32;
 use taxel_firmware::link::message::{Configuration, ModelFault, Refusal, Report, Request, Setting};
 
-use super::requests::{decode, expected};
 use crate::mock::*;
 
 #[test]
@@ -104,7 +103,7 @@ fn a_model_is_decoded_from_ram_where_it_fits() {
         let mut host = bench.session();
         assert_eq!(host.model().unwrap().in_ram, in_ram);
         let frame = frame_at_rest();
-        assert_eq!(decode(&mut host, &frame).2, expected(&blob, &frame));
+        assert_eq!(host.decode(&frame).2, expected(&blob, &frame));
         assert_eq!(bytemuck::cast_slice::<u32, u8>(&bench.weights).starts_with(&blob), in_ram);
     }
 }

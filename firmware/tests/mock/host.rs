@@ -13,6 +13,7 @@ use taxel_firmware::link::{cobs, packet};
 
 use super::board::{Board, Pins};
 use super::flash::Flash;
+use super::models::bits;
 use super::shape::{ROWS, TestFrame};
 use super::source::Source;
 
@@ -206,6 +207,13 @@ impl Host<'_, '_> {
         answer!(self, &request, Report::Estimate(it) => {
             assert_eq!((it.frame, it.start_us), (5, start_us));
             read(it)
+        })
+    }
+
+    /// Flags, row status and bits of the outputs of the answer to a frame.
+    pub fn decode(&mut self, frame: &TestFrame) -> (u8, Vec<u8>, Vec<u32>) {
+        self.estimate(0, frame.as_flattened(), |it| {
+            (it.flags, it.row_status.to_vec(), bits(it.outputs.iter()))
         })
     }
 

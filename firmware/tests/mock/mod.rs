@@ -8,7 +8,6 @@ mod shape;
 mod flash;
 mod board;
 mod source;
-mod row_model;
 mod models;
 mod host;
 mod bench;
@@ -19,6 +18,8 @@ pub use device::{Device, confirmed};
 pub use flash::{Flash, Supply};
 pub(crate) use host::answer;
 pub use host::{CHUNK, Host, TRY, begin, framed, request_bytes, trial_steps};
-pub use models::{blob, blob_of_changes, blob_of_features, blob_with_readings, crc_of};
-pub use row_model::{OVERFLOWING, blob_of_a_row, blob_of_names};
+pub use models::{
+    OVERFLOWING, bits, blob, blob_of_a_row, blob_of_changes, blob_of_features, blob_of_names,
+    blob_with_readings, crc_of, expected,
+};
 pub use shape::{COLS, OUTPUTS, ROWS, TestFrame, frame_at_rest, frame_with};
