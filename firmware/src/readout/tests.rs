@@ -59,8 +59,10 @@ impl Record {
         self.count(|event| matches!(event, Event::Pin(..)))
     }
 
+    /// Lets converters answer with these counts.
     fn answer(&self, counts: &[u16]) {
-        self.0.borrow_mut().answers = counts.iter().map(|counts| answer(*counts)).collect();
+        let bytes = counts.iter().map(|counts| counts.to_be_bytes());
+        self.0.borrow_mut().answers = bytes.map(|[high, low]| [0, high, low]).collect();
     }
 
     fn fail_transfer(&self, number: Option<usize>) {
@@ -237,11 +239,6 @@ fn scan(scanner: &mut TestScanner) -> ([[f32; 3]; 2], u16) {
 
 fn are_missing(frame: [[f32; 3]; 2]) -> [[bool; 3]; 2] {
     frame.map(|row| row.map(f32::is_nan))
-}
-
-/// Bytes in which a converter answers with these counts.
-fn answer(counts: u16) -> [u8; 3] {
-    [0, counts.to_be_bytes()[0], counts.to_be_bytes()[1]]
 }
 
 /// A circuit with leads, which are taken out of whole frames.
