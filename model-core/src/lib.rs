@@ -41,6 +41,7 @@ mod infer;
 mod frame_decoder;
 mod decoder;
 mod fixed;
+pub mod track;
 
 pub use blob::Aligned;
 #[cfg(feature = "std")]

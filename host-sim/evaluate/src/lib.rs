@@ -19,6 +19,7 @@ pub mod experiment;
 pub mod moving;
 pub mod device;
 pub mod touches;
+pub mod tracking;
 pub mod training_set;
 pub mod subject;
 pub mod others;

@@ -247,6 +247,9 @@ impl Measurements {
             }
         }
         let how = given.over(&self.how)?;
+        require(!how.track, "training.track", true, || {
+            "a tracker is of a scene, which says how contacts move: leave it out".into()
+        })?;
         require(
             how.relative_inputs == self.training.relative_inputs,
             "training.relative_inputs",

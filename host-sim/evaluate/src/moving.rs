@@ -9,6 +9,7 @@ use taxel_data::dataset::Dataset;
 use taxel_data::random::Stream;
 use taxel_data::table::Table;
 use taxel_learn::filtered::filter_frames;
+use taxel_learn::{Decoder, Frames, Timing};
 use taxel_simulate::Synthesis;
 use taxel_simulate::path::Path;
 use taxel_simulate::timetable::Timetable;
@@ -85,6 +86,20 @@ impl Moving {
             filter_frames(&mut state, settings, &start_us, trajectory);
         });
         filtered
+    }
+
+    /// Estimates of all frames by a decoder that is told when each reading was taken.
+    pub fn decoded(&self, decoder: &dyn Decoder) -> Vec<f64> {
+        let (scans, frames) = (self.timetable.scans(), &self.frames);
+        let start_us = self.timetable.starts_s.iter().map(|start_s| (start_s * 1e6).round() as u64);
+        let start_us: Vec<u64> = start_us.cycle().take(frames.frames()).collect();
+        let columns = frames.inputs.names.len() / frames.rows;
+        let row_us = |row: usize| 1e6 * self.timetable.row_offset_s(row, frames.rows);
+        let reading_offset_us: Vec<f64> =
+            (0..frames.rows).flat_map(|row| vec![row_us(row); columns]).collect();
+        let timing = Timing { start_us: &start_us, reading_offset_us: &reading_offset_us };
+        let readings = Frames { readings: &frames.inputs.values, timing: Some(timing) };
+        decoder.decode_frames(readings, scans).values
     }
 
     /// Newest finished estimates at all moments, of the `estimates` of all frames (`frames × outputs`): an estimate is

@@ -9,7 +9,7 @@ use taxel_data::random::Stream;
 use taxel_data::table::Table;
 use taxel_learn::cost::Cost;
 use taxel_learn::filtered::{Movement, settings_for};
-use taxel_learn::{Decoder, ModelBlob, PreparedModel};
+use taxel_learn::{Decoder, ModelBlob, PreparedModel, Tracked};
 use taxel_simulate::Synthesis;
 use taxel_simulate::path::Path;
 
@@ -46,13 +46,15 @@ pub struct Touched {
     /// Its estimates of all these frames, and what the filter makes of them.
     pub estimates: Vec<f64>,
     pub filtered: Vec<f64>,
-    /// Without a filter, and behind one.
-    pub ways: [Way; 2],
+    /// Without a filter, behind one, and behind the model's tracker if it has one.
+    pub ways: Vec<Way>,
 }
 
 /// One way to decode moving contacts.
 pub struct Way {
     pub filter: Settings,
+    /// Whether the model's tracker stands behind it, in place of a filter.
+    pub is_tracked: bool,
     pub cost: Cost,
     pub times: Times,
     pub errors: Vec<Errors>,
@@ -82,7 +84,8 @@ impl<'s> Touches<'s> {
         Self { scene, synthesis, path, passes, group: group.into(), last: Mutex::default() }
     }
 
-    /// Errors of the model in `blob` as a `device` runs it that scans in `scan_ms`: without a filter in time, and behind one.
+    /// Errors of the model in `blob` as a `device` runs it that scans in `scan_ms`: without a filter in time, behind one, and
+    /// behind its tracker.
     /// Its decoding has this `cost`.
     ///
     /// # Errors
@@ -101,7 +104,9 @@ impl<'s> Touches<'s> {
         let of_period = self.at(&times)?;
         let estimates = decode(&of_period);
         let (errors, blocks) = of_period.moving.errors(&estimates, times.frame_ms, measure);
-        let plain = Way { filter: Settings::default(), cost, times, errors, blocks };
+        let filter = Settings::default();
+        let plain = Way { filter, is_tracked: false, cost, times, errors, blocks };
+        let tracked = self.tracked((blob, model), cost, (device, scan_ms), measure)?;
         // Behind a filter frames take longer, if only a little.
         let slower = self.at(&filter_times)?;
         let estimates = if Arc::ptr_eq(&slower, &of_period) { estimates } else { decode(&slower) };
@@ -110,8 +115,32 @@ impl<'s> Touches<'s> {
         let filtered = slower.moving.filtered(&estimates, filter);
         let (errors, blocks) = slower.moving.errors(&filtered, filter_times.frame_ms, measure);
         let (cost, times) = (behind_filter, filter_times);
-        let behind = Way { filter, cost, times, errors, blocks };
-        Ok(Touched { of_period: slower, estimates, filtered, ways: [plain, behind] })
+        let behind = Way { filter, is_tracked: false, cost, times, errors, blocks };
+        let ways = [plain, behind].into_iter().chain(tracked).collect();
+        Ok(Touched { of_period: slower, estimates, filtered, ways })
+    }
+
+    /// Errors of the model behind its tracker; `None` if it has none. Outputs are those expected in the middle of the time for
+    /// which an estimate is held.
+    fn tracked(
+        &self,
+        (blob, model): (&ModelBlob, &PreparedModel<'_>),
+        cost: Cost,
+        (device, scan_ms): (&Device, Option<f64>),
+        measure: &Measure,
+    ) -> Result<Option<Way>> {
+        let parsed = blob.parse();
+        let Some(tracker) = parsed.tracker() else { return Ok(None) };
+        let cost = cost.plus(Cost::of_tracker(tracker.sizes()));
+        let times = device.times(scan_ms, &cost);
+        let of_period = self.at(&times)?;
+        let ahead_ms = times.frame_ms + 0.5 * of_period.period_ms;
+        let relative = parsed.metadata().relative_inputs;
+        let decoder = Tracked::new(model.clone(), tracker, relative, (1000.0 * ahead_ms) as f32);
+        let estimates = of_period.moving.decoded(&decoder);
+        let (errors, blocks) = of_period.moving.errors(&estimates, times.frame_ms, measure);
+        let filter = Settings::default();
+        Ok(Some(Way { filter, is_tracked: true, cost, times, errors, blocks }))
     }
 
     /// Frames of a device that scans and decodes in these `times`. Their period is rounded up, by a fiftieth at most, so that

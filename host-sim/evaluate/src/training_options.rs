@@ -29,6 +29,8 @@ pub struct Training {
     pub relative_inputs: bool,
     /// What the model's statistics of readings tell: missing readings, and how novel a frame is and how far off outputs.
     pub reading_model: Option<Extent>,
+    /// Whether the model has a tracker of a contact.
+    pub track: bool,
 }
 
 impl Training {
@@ -41,7 +43,7 @@ impl Training {
 impl Default for Training {
     fn default() -> Self {
         let options = Options::default();
-        Self { options, refine: true, relative_inputs: false, reading_model: None }
+        Self { options, refine: true, relative_inputs: false, reading_model: None, track: false }
     }
 }
 
@@ -111,6 +113,10 @@ pub struct TrainingOptions {
     /// readings, fill takes 7 kB, and full 27 kB. Either takes ten frames of training for each reading.
     #[arg(long, value_name = "EXTENT", value_parser = extent())]
     pub reading_model: Option<Extent>,
+    /// Give the model a tracker of one contact that moves (docs/filter.md): its deformations are then those of a contact
+    /// that fits the readings of all frames so far. For scenes of one contact; 36 kB for 8 × 18 wires.
+    #[arg(long, action = ArgAction::Set, num_args = 0, default_missing_value = "true")]
+    pub track: Option<bool>,
 }
 
 impl TrainingOptions {
@@ -146,6 +152,7 @@ impl TrainingOptions {
             refine: self.refine.unwrap_or(refine) && !is_paper,
             relative_inputs: self.relative_inputs.unwrap_or(usual.relative_inputs),
             reading_model: self.reading_model.or(usual.reading_model),
+            track: self.track.unwrap_or(usual.track),
         })
     }
 

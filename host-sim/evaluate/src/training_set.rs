@@ -14,6 +14,7 @@ use taxel_simulate::Synthesis;
 
 use crate::error::Result;
 use crate::experiment::{Experiment, MoreFrames};
+use crate::tracking;
 
 /// Frames to train on, and what refinement measures the error on.
 pub struct TrainingSet<'s> {
@@ -24,6 +25,8 @@ pub struct TrainingSet<'s> {
     pub refine: bool,
     /// What the model's statistics of readings tell.
     pub reading_model: Option<Extent>,
+    /// Whether the model gets a tracker, which only that of a scene can.
+    pub track: bool,
     more: More<'s>,
 }
 
@@ -47,6 +50,7 @@ impl<'s> TrainingSet<'s> {
             origin: experiment.origin(),
             refine: t.refine,
             reading_model: t.reading_model,
+            track: t.track,
             more: More::Scene(Box::new(MoreFrames { experiment, synthesis })),
         }
     }
@@ -55,7 +59,7 @@ impl<'s> TrainingSet<'s> {
     /// model, unless the fields ask for it.
     pub fn of_folds(frames: &'s Dataset, fold_of: &'s [usize], origin: Origin) -> Self {
         let (frames, more) = (Cow::Borrowed(frames), More::Folds(fold_of));
-        Self { frames, origin, refine: false, reading_model: None, more }
+        Self { frames, origin, refine: false, reading_model: None, track: false, more }
     }
 
     /// What refinement measures the error on; `None` if it is not asked for.
@@ -138,9 +142,13 @@ impl<'s> TrainingSet<'s> {
     ) -> Result<ModelBlob> {
         let origin = Origin { linear_rmse, ..self.origin.clone() };
         let blob = pack(trained, &self.frames, &origin)?;
-        match self.reading_model {
-            Some(extent) => self.with_reading_model(&blob, extent, options, progress),
-            None => Ok(blob),
+        let blob = match self.reading_model {
+            Some(extent) => self.with_reading_model(&blob, extent, options, progress)?,
+            None => blob,
+        };
+        match &self.more {
+            More::Scene(more) if self.track => tracking::add(&blob, &more.experiment.world),
+            _ => Ok(blob),
         }
     }
 

@@ -11,6 +11,7 @@ pub use memory::DecoderRam;
 use serde::Serialize;
 use taxel_core::blob::ModelShape;
 use taxel_core::rbf::Format;
+use taxel_core::track;
 
 /// Instructions of one number format's code, and their cycles.
 struct Price {
@@ -74,6 +75,11 @@ const RELATIVE: f64 = 12.0;
 /// Instructions of the filter in time: of a frame, of each row and of each output; and cycles of one.
 const FILTER: [f64; 3] = [163.0, 24.0, 26.0];
 const FILTER_CYCLES: f64 = 1.7;
+
+/// Instructions of a tracker whose contact presses all electrodes: of a frame, of each electrode, of each cell, and of each
+/// electrode and column; and cycles of one.
+const TRACKER: [f64; 4] = [13_000.0, 1_600.0, 270.0, 150.0];
+const TRACKER_CYCLES: f64 = 1.8;
 
 /// Instructions of what stands before a `network`, for so many `readings` of a frame.
 fn before(network: &NetworkDesign, readings: f64, relative: bool) -> f64 {
@@ -144,6 +150,16 @@ impl Cost {
         let [frame, row, output] = FILTER;
         let (rows, outputs) = (shape.rows as f64, (shape.rows * shape.outputs) as f64);
         Self::new(frame + row * rows + output * outputs, FILTER_CYCLES)
+    }
+
+    /// Cost of [tracking](taxel_core::track) a contact, of a sensor of these sizes.
+    #[must_use]
+    pub fn of_tracker(sizes: track::Sizes) -> Self {
+        let [frame, electrode, cell, share] = TRACKER;
+        let [electrodes, cells] = [sizes.all_electrodes(), sizes.cells()].map(|it| it as f64);
+        let shares = electrodes * sizes.columns as f64;
+        let instructions = frame + electrode * electrodes + cell * cells + share * shares;
+        Self::new(instructions, TRACKER_CYCLES)
     }
 
     fn new(instructions: f64, cycles: f64) -> Self {

@@ -8,6 +8,7 @@ use taxel_core::blob::{
 };
 use taxel_core::rbf::Network;
 use taxel_core::reading_model::ReadingModel;
+use taxel_core::track::Tracker;
 use taxel_data::{Dataset, columns, input};
 
 use crate::error::{Error, Result, not_packed};
@@ -102,6 +103,7 @@ fn packed(
         fronts: &fronts,
         linear_rmse: Floats(&linear_rmse),
         reading_model: None,
+        tracker: None,
         networks: &views,
         row_network: &row_network,
         metadata: Metadata {
@@ -187,7 +189,18 @@ impl ModelBlob {
         let model = self.parse();
         let (fronts, networks): (Vec<_>, Vec<_>) =
             (model.fronts().collect(), model.networks().collect());
-        rebuild(&model, &fronts, &networks, reading_model)
+        rebuild(&model, &fronts, &networks, reading_model, model.tracker())
+    }
+
+    /// Blob of this model with the given tracker.
+    ///
+    /// # Errors
+    /// [`Error`] for a tracker of another sensor, or a blob that becomes too large.
+    pub fn with_tracker(&self, tracker: Tracker<'_>) -> Result<Self> {
+        let model = self.parse();
+        let (fronts, networks): (Vec<_>, Vec<_>) =
+            (model.fronts().collect(), model.networks().collect());
+        rebuild(&model, &fronts, &networks, model.reading_model(), Some(tracker))
     }
 
     /// Mean width σ of all Gaussians, on inputs scaled to [0, 1], to four digits.
@@ -210,7 +223,7 @@ impl ModelBlob {
     }
 }
 
-/// Blob of `model` with these `fronts`, `networks` and reading model instead of its own.
+/// Blob of `model` with these `fronts`, `networks`, reading model and tracker instead of its own.
 ///
 /// # Errors
 /// [`Error`] for parts that do not belong together, or a blob that becomes too large.
@@ -219,6 +232,7 @@ pub(crate) fn rebuild(
     fronts: &[Front<'_>],
     networks: &[Network<'_>],
     reading_model: Option<ReadingModel<'_>>,
+    tracker: Option<Tracker<'_>>,
 ) -> Result<ModelBlob> {
     let of_row = |row| model.network_of_row(row).map(|network| network as u8);
     let row_network: Vec<u8> = (0..model.shape().rows).filter_map(of_row).collect();
@@ -226,6 +240,7 @@ pub(crate) fn rebuild(
         fronts,
         linear_rmse: model.linear_rmse(),
         reading_model,
+        tracker,
         networks,
         row_network: &row_network,
         metadata: *model.metadata(),

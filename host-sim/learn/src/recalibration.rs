@@ -147,7 +147,7 @@ pub fn recalibrate(
     let reading_model = own.map(|own| ReadingModel::new(own.sizes(), &block)).transpose();
     let reading_model = reading_model.map_err(|_| no_regression())?;
     Ok(Recalibrated {
-        blob: rebuild(model.model(), &fronts, &networks, reading_model)?,
+        blob: rebuild(model.model(), &fronts, &networks, reading_model, model.model().tracker())?,
         presses: units.iter().map(|unit| unit.presses.len()).min().unwrap_or(0),
         error_before,
         error_after,

@@ -15,7 +15,7 @@ use taxel_data::table::Table;
 use taxel_firmware::link::message::EstimateReport;
 use taxel_learn::filtered::filter_frames;
 use taxel_learn::infer::is_missing;
-use taxel_learn::{ModelBlob, PreparedModel};
+use taxel_learn::{Decoder, Frames, ModelBlob, PreparedModel, Timing, Tracked};
 use taxel_recording::{Extras, Frame};
 
 use super::data_file::DataFileArguments;
@@ -31,6 +31,7 @@ use super::{Common, arguments, print};
 /// Where a reading is missing, the outputs of its row-wire are left empty. If one network decodes the whole
 /// array, all outputs of the line are. A place is left empty where nothing touches. A model trained with --reading-model
 /// tells missing readings from the others instead.
+/// A model with a tracker (`train --track`) follows the contact from line to line, if the file has times.
 /// Estimates are written with the digits that tell an f32 from its neighbours.
 ///
 /// The last column, `status`, is the sum of a device's flags (docs/link.md): 0 for a sound frame, 2 a faulty reading,
@@ -106,6 +107,18 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<print::Outcome>
         let start_us = arguments.period.of_file(&file)?;
         let mut state = State::new(vec![[0.0; 2]; estimate.names.len()]);
         filter_frames(&mut state, settings, &start_us, &mut estimate.values);
+    } else if let Some(tracker) = parsed.tracker() {
+        match arguments.period.of_file(&file) {
+            Ok(start_us) => {
+                let (relative, lead_us) = (metadata.relative_inputs, settings.lead_us as f32);
+                let tracked = Tracked::new(model.clone().of_inputs(), tracker, relative, lead_us);
+                let timing = Some(Timing { start_us: &start_us, reading_offset_us: &[] });
+                let inputs = model.model_inputs(&readings.values);
+                let frames = Frames { readings: &inputs, timing };
+                estimate.values = tracked.decode_frames(frames, start_us.len()).values.into();
+            }
+            Err(cause) => common.remark(format_args!("note: no contact is tracked: {cause}")),
+        }
     }
     let keep = kept(arguments, &file, &estimate)?;
     let assessed = arguments.confidence.then(|| model.assess(&readings.values));

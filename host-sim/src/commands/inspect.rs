@@ -62,6 +62,8 @@ fn sections_of(blob: &ModelBlob) -> Sections {
     let features = projections.map(|it| it.features()).max().unwrap_or(0);
     result.fact("projected_features", "features of all rows’ readings", "", features);
     reading_model(&mut result, &model);
+    let bytes = model.tracker().map(|tracker| 4 * tracker.block().len());
+    result.fact("tracker", "tracker of a contact", "bytes", bytes);
     networks(&mut result, &model);
     costs(&mut result, blob, &model, &design);
     let columns = metadata.input_names.iter().zip(metadata.input_units.iter());

@@ -313,10 +313,14 @@ fn moving_contacts(sections: &mut Sections, moving: Option<&MovingContacts>) {
     let Some(moving) = moving else { return sections.value("moving", &[(); 0]) };
     sections.heading("Contacts that move");
     let ways = moving.ways.iter().map(|way| {
-        let name = way.filter.map_or(NETWORK.to_owned(), |filter| {
-            let [tau, lead] = [filter.time_constant_ms, filter.lead_ms].map(|ms| fixed(ms, 1));
-            format!("{NETWORK}, filter of {tau} ms, {lead} ms ahead")
-        });
+        let name = match way.filter {
+            Some(filter) => {
+                let [tau, lead] = [filter.time_constant_ms, filter.lead_ms].map(|ms| fixed(ms, 1));
+                format!("{NETWORK}, filter of {tau} ms, {lead} ms ahead")
+            }
+            None if way.is_tracked => format!("{NETWORK}, tracked"),
+            None => NETWORK.to_owned(),
+        };
         (name, Some(way), &way.errors[..])
     });
     let baselines = moving.decoders.iter().map(|it| (it.decoder.clone(), None, &it.errors[..]));

@@ -334,7 +334,8 @@ fn ways<'r>(table: TableOf<'r, Marked<'r>>, trade: &Trade) -> TableOf<'r, Marked
         .names("samples", "samples", move |row| count(averaged.then_some(row.1.samples_averaged)))
         .names("filter", "filter", |row| {
             let ms = row.1.filter.map(|it| it.time_constant_ms);
-            ms.map_or(UNDEFINED.into(), |ms| format!("{ms:.1} ms"))
+            let of_tracker = if row.1.is_tracked { "tracked" } else { UNDEFINED };
+            ms.map_or(of_tracker.into(), |ms| format!("{ms:.1} ms"))
         })
 }
 

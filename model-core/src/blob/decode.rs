@@ -8,12 +8,14 @@ use super::format::{
 use super::front::{Front, MOST_FRONTS};
 use super::metadata::{Columns, Floats, Metadata, ModelShape};
 use super::sections::{
-    check_count, cut_reading_model, take, take_block, take_linear, take_relative_inputs,
+    check_count, cut_reading_model, cut_tracker, take, take_block, take_linear,
+    take_relative_inputs,
 };
 use crate::checksum::CRC_32;
 use crate::rbf::{Cut, Format, Network, NetworkError, Shape, fixed16, float32};
 use crate::reading_model::ReadingModel;
 use crate::scale::UNITS;
+use crate::track::Tracker;
 
 /// A model, borrowed from a blob whose every byte and value has been checked.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -25,8 +27,8 @@ pub struct Model<'a> {
     /// Whether networks see whole frames, each behind a front.
     whole_frames: bool,
     networks: u8,
-    /// The sections of the linear decoder's errors and of the reading model, if there are any, and those of the networks:
-    /// nothing else is kept of the first two, to save RAM.
+    /// The sections of the linear decoder's errors, of the reading model and of the tracker, if there are any, and those of the
+    /// networks: nothing else is kept of the first three, to save RAM.
     last_sections: &'a [u8],
 }
 
@@ -63,11 +65,12 @@ impl<'a> Model<'a> {
         if !linear_rmse.iter().all(in_range) {
             return Err(DecodeError::InvalidMetadata { field: "linear error" });
         }
-        let (reading_model, network_sections) = cut_reading_model(rest, shape)?;
+        let (reading_model, rest) = cut_reading_model(rest, shape)?;
         if let Some(model) = reading_model {
             ReadingModel::new(model.sizes(), model.block())
                 .map_err(|cause| DecodeError::ReadingModel { cause })?;
         }
+        let (_, network_sections) = cut_tracker(rest, shape)?;
 
         let model = Self {
             shape,
@@ -173,7 +176,18 @@ impl<'a> Model<'a> {
         take_linear(self.last_sections, self.shape).map_or(Floats(&[]), |(rmse, _)| rmse)
     }
 
-    /// The reading model, and the sections of the networks.
+    /// What tracks a contact over frames; `None` if the model has none.
+    pub fn tracker(&self) -> Option<Tracker<'a>> {
+        cut_tracker(self.cut_reading_model().1, self.shape).ok()?.0
+    }
+
+    /// The sections of the networks.
+    fn network_sections(&self) -> &'a [u8] {
+        let rest = self.cut_reading_model().1;
+        cut_tracker(rest, self.shape).map_or(rest, |(_, rest)| rest)
+    }
+
+    /// The reading model, and the sections behind it.
     fn cut_reading_model(&self) -> (Option<ReadingModel<'a>>, &'a [u8]) {
         let rest =
             take_linear(self.last_sections, self.shape).map_or(self.last_sections, |it| it.1);
@@ -182,7 +196,7 @@ impl<'a> Model<'a> {
 
     /// Networks in the order of the blob, with what stands before each.
     pub(crate) fn parts(&self) -> impl Iterator<Item = Part<'a>> {
-        let (model, mut rest) = (*self, self.cut_reading_model().1);
+        let (model, mut rest) = (*self, self.network_sections());
         (0..self.networks).map_while(move |index| {
             let (part, after) = model.take_part(rest, index).ok()?;
             rest = after;

@@ -9,13 +9,14 @@ use super::error::EncodeError;
 use super::format::{
     CRC_BYTES, FLOAT_ALIGNMENT, FORMAT_VERSION, LinearSection, MAGIC, MetadataSection, Prefix,
     RbfHeader, ReadingModelHeader, ShapeField, TAG_LINEAR, TAG_METADATA, TAG_READING_MODEL,
-    TAG_RELATIVE_INPUTS,
+    TAG_RELATIVE_INPUTS, TAG_TRACKER, TrackerHeader,
 };
 use super::front::Front;
 use super::metadata::{Floats, Metadata};
 use crate::checksum::CRC_32;
 use crate::rbf::Network;
 use crate::reading_model::ReadingModel;
+use crate::track::Tracker;
 
 /// Contents of a blob: what [`encode`] writes.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -27,6 +28,8 @@ pub struct ModelParts<'a> {
     pub linear_rmse: Floats<'a>,
     /// Statistics of the readings.
     pub reading_model: Option<ReadingModel<'a>>,
+    /// What tracks a contact over frames.
+    pub tracker: Option<Tracker<'a>>,
     /// The networks; all have the same number of inputs and of outputs.
     pub networks: &'a [Network<'a>],
     /// Index into `networks` for each row.
@@ -38,8 +41,8 @@ pub struct ModelParts<'a> {
 impl<'a> ModelParts<'a> {
     /// Networks that decode rows from their readings, and nothing else. Each row has an index into `networks`.
     pub fn new(networks: &'a [Network<'a>], row_network: &'a [u8], metadata: Metadata<'a>) -> Self {
-        let (fronts, linear_rmse, reading_model) = (&[], Floats(&[]), None);
-        Self { fronts, linear_rmse, reading_model, networks, row_network, metadata }
+        let (fronts, linear_rmse, reading_model, tracker) = (&[], Floats(&[]), None, None);
+        Self { fronts, linear_rmse, reading_model, tracker, networks, row_network, metadata }
     }
 }
 
@@ -59,7 +62,8 @@ pub fn encoded_length_bound(parts: &ModelParts<'_>) -> usize {
     let weights: usize = parts.networks.iter().map(|n| SECTION_FIELDS + block_bytes(n)).sum();
     let fronts = parts.fronts.iter().flat_map(Front::block).map(<[u32]>::len);
     let floats = parts.reading_model.map(|it| it.block().len());
-    let blocks = floats.into_iter().chain(fronts);
+    let of_tracker = parts.tracker.map(|it| it.block().len());
+    let blocks = floats.into_iter().chain(of_tracker).chain(fronts);
     let blocks: usize = blocks.map(|words| SECTION_FIELDS + words * 4).sum();
     FIXED_FIELDS + text + numbers + blocks + weights
 }
@@ -116,6 +120,11 @@ pub fn encode<'b>(parts: &ModelParts<'_>, buffer: &'b mut [u8]) -> Result<&'b [u
         let components = fit("number of components", model.sizes().components, u16::MAX)?;
         writer.put(&ReadingModelHeader { tag: TAG_READING_MODEL, factors, components })?;
         writer.put_block(&[bytemuck::cast_slice(model.block())])?;
+    }
+    if let Some(tracker) = parts.tracker {
+        let electrodes = fit("number of electrodes", tracker.sizes().electrodes, u8::MAX)?;
+        writer.put(&TrackerHeader { tag: TAG_TRACKER, electrodes })?;
+        writer.put_block(&[bytemuck::cast_slice(tracker.block())])?;
     }
     for (index, network) in parts.networks.iter().enumerate() {
         if let Some(front) = parts.fronts.get(index) {

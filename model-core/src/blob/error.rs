@@ -104,6 +104,12 @@ pub enum DecodeError {
         /// What is wrong with the projection.
         cause: NetworkError,
     },
+    /// The tracker's parameters are not valid.
+    #[error("tracker: {cause}")]
+    Tracker {
+        /// What is wrong with the tracker.
+        cause: NetworkError,
+    },
     /// The reading model's parameters are not valid.
     #[error("reading model: {cause}")]
     ReadingModel {

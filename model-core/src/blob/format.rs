@@ -26,6 +26,7 @@ pub(super) const TAG_RELATIVE_INPUTS: u8 = 3;
 pub(super) const TAG_FRONT: u8 = 4;
 pub(super) const TAG_LINEAR: u8 = 6;
 pub(super) const TAG_READING_MODEL: u8 = 8;
+pub(super) const TAG_TRACKER: u8 = 9;
 
 /// Bytes 0..9, at fixed places, so that a blob's length is known before anything else is read.
 #[derive(Serialize, Deserialize)]
@@ -117,13 +118,22 @@ pub(super) struct ReadingModelHeader {
     pub components: u16,
 }
 
+/// Header of the tracker's section; padding and its floats follow.
+#[derive(Serialize, Deserialize)]
+pub(super) struct TrackerHeader {
+    pub tag: u8,
+    /// Number of electrodes of a row.
+    pub electrodes: u8,
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
     fn no_format_of_networks_has_the_tag_of_another_section() {
-        for tag in [TAG_METADATA, TAG_FRONT, TAG_RELATIVE_INPUTS, TAG_LINEAR, TAG_READING_MODEL] {
+        let others = [TAG_FRONT, TAG_RELATIVE_INPUTS, TAG_LINEAR, TAG_READING_MODEL, TAG_TRACKER];
+        for tag in others.into_iter().chain([TAG_METADATA]) {
             assert_eq!(Format::from_tag(tag), None);
         }
     }

@@ -3,10 +3,11 @@
 use super::error::DecodeError;
 use super::format::{
     FLOAT_ALIGNMENT, LinearSection, ReadingModelHeader, TAG_LINEAR, TAG_READING_MODEL,
-    TAG_RELATIVE_INPUTS,
+    TAG_RELATIVE_INPUTS, TAG_TRACKER, TrackerHeader,
 };
 use super::metadata::{Floats, ModelShape};
 use crate::reading_model::{ReadingModel, Sizes};
+use crate::track::{self, Tracker};
 
 /// Takes the postcard fields `T` of a `section` from the front of `bytes`.
 pub(super) fn take<'a, T: serde::Deserialize<'a>>(
@@ -84,4 +85,26 @@ pub(super) fn cut_reading_model(
     let block = bytemuck::try_cast_slice::<u8, f32>(block)
         .map_err(|_| DecodeError::Malformed { section: "padding" })?;
     Ok((Some(ReadingModel::of_checked(sizes, block)), rest))
+}
+
+/// Cuts the tracker from the front of `bytes` if there is one, and checks it.
+pub(super) fn cut_tracker(
+    bytes: &[u8],
+    shape: ModelShape,
+) -> Result<(Option<Tracker<'_>>, &[u8]), DecodeError> {
+    const SECTION: &str = "tracker section";
+    if bytes.first() != Some(&TAG_TRACKER) {
+        return Ok((None, bytes));
+    }
+    let (header, rest) = take::<TrackerHeader>(bytes, SECTION)?;
+    let ModelShape { rows, inputs, outputs } = shape;
+    let sizes = track::Sizes { rows, electrodes: header.electrodes.into(), columns: inputs };
+    if !sizes.has_outputs(outputs) {
+        return Err(DecodeError::Malformed { section: SECTION });
+    }
+    let (block, rest) = take_block(rest, SECTION)?;
+    let block = bytemuck::try_cast_slice::<u8, f32>(block)
+        .map_err(|_| DecodeError::Malformed { section: "padding" })?;
+    let tracker = Tracker::new(sizes, block).map_err(|cause| DecodeError::Tracker { cause })?;
+    Ok((Some(tracker), rest))
 }

@@ -32,6 +32,8 @@ pub struct MovingContacts {
 pub struct MovingWay {
     /// Filter in time behind the model; `None` without one.
     pub filter: Option<FilterSettings>,
+    /// Whether the model's tracker stands behind it, in place of a filter.
+    pub is_tracked: bool,
     pub times: Times,
     pub errors: Vec<Errors>,
 }
@@ -70,6 +72,7 @@ impl MovingContacts {
             baselines.iter().map(|it| touches.judge_at_once(it.as_ref(), scan_ms, &measure));
         let way = |way: &Way| MovingWay {
             filter: way.filter.is_on().then(|| way.filter.into()),
+            is_tracked: way.is_tracked,
             times: way.times,
             errors: way.errors.clone(),
         };
@@ -87,7 +90,7 @@ impl ShownTrajectory {
     /// First trajectory, and the output of `group` that changes most in it.
     fn new(touched: &Touched, group: &str) -> Self {
         let moving = &touched.of_period.moving;
-        let [plain, behind] = &touched.ways;
+        let [plain, behind, ..] = &touched.ways[..] else { unreachable!("two ways at least") };
         let names = &moving.truth.names;
         let of_output = |values: &[f64], output: usize| -> Vec<f64> {
             let moments = values.chunks_exact(names.len()).take(moving.moments_s.len());

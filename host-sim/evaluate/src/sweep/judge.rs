@@ -6,6 +6,7 @@ use std::borrow::Cow;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use taxel_core::filter::{Settings, Track};
+use taxel_core::track::State;
 use taxel_data::{Dataset, Silent, columns};
 use taxel_learn::cost::{Cost, DecoderRam, Design};
 use taxel_learn::decoders::BASELINES;
@@ -385,11 +386,11 @@ impl<'s> Frames<'s> {
                 let (errors, blocks) =
                     metrics::with_blocks(&self.test.outputs, &estimates, measure);
                 let (filter, times) = (Settings::default(), device.times(*scan_ms, &cost));
-                vec![Way { filter, cost, times, errors, blocks }]
+                vec![Way { filter, is_tracked: false, cost, times, errors, blocks }]
             }
             Some(touches) => {
                 before.cell = self.table.as_ref().and_then(|_| self.cell(&decoded(), options));
-                touches.judge((blob, &model), cost, (device, *scan_ms), measure)?.ways.into()
+                touches.judge((blob, &model), cost, (device, *scan_ms), measure)?.ways
             }
         };
         for decoder in &self.baselines {
@@ -401,7 +402,10 @@ impl<'s> Frames<'s> {
         before.add("centres", centres.map(|centres| centres as f64));
         before.add("spread", Some(blob.spread()));
         before.add("blob_bytes", Some(blob.bytes().len() as f64));
-        let filter_bytes = FILTER_BYTES * self.test.outputs.names.len();
+        let filter_bytes = match blob.parse().tracker() {
+            Some(_) => size_of::<State>(),
+            None => FILTER_BYTES * self.test.outputs.names.len(),
+        };
         Ok(Judged {
             others: self.others(&model),
             ram_bytes: [0, filter_bytes].map(|bytes| DecoderRam::new(&design).bytes() + bytes),

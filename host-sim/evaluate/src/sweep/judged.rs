@@ -41,8 +41,9 @@ pub struct Judged {
 }
 
 impl Judged {
+    /// Without a filter; or with the last of what stands behind the model: its tracker, or else a filter.
     pub(super) fn way(&self, filter: bool) -> &Way {
-        &self.ways[usize::from(filter)]
+        &self.ways[if filter { self.ways.len() - 1 } else { 0 }]
     }
 
     /// Results by their names.
@@ -76,7 +77,9 @@ impl Judged {
         results.add("instructions", Some(way.cost.instructions as f64));
         results.add("cycles", Some(way.cost.cycles as f64));
         results.add("ram_bytes", Some(self.ram_bytes[usize::from(filter)] as f64));
-        if filter {
+        if way.is_tracked {
+            results.add("tracked", Some(1.0));
+        } else if filter {
             let Settings { time_constant_us, lead_us, .. } = way.filter;
             results.add("filter_ms", Some(f64::from(time_constant_us) / 1000.0));
             results.add("lead_ms", Some(f64::from(lead_us) / 1000.0));

@@ -47,6 +47,8 @@ pub struct Point {
     pub samples_averaged: usize,
     /// Filter in time behind the decoder; `None` without one.
     pub filter: Option<FilterSettings>,
+    /// Whether the model's tracker stands behind the decoder, in place of a filter.
+    pub is_tracked: bool,
     /// Times of one frame on the plan's device.
     pub times: Times,
     /// Cycles of decoding a frame on a Cortex-M4F.
@@ -84,6 +86,7 @@ impl Point {
                 .zip(lead_ms)
                 .filter(|(ms, _)| filter && *ms > 0.0)
                 .map(|(time_constant_ms, lead_ms)| FilterSettings { time_constant_ms, lead_ms }),
+            is_tracked: result("tracked").is_some(),
             times: Times {
                 scan_ms: result("scan_ms"),
                 decode_ms: result("decode_ms")?,
@@ -104,7 +107,13 @@ impl Point {
     pub(super) fn order(&self) -> impl Ord + use<> {
         let network = (!self.each_row, self.centres);
         let format = Format::ALL.iter().rev().position(|format| *format == self.format);
-        (self.column_step, self.samples_averaged, network, format, self.filter.is_some())
+        (
+            self.column_step,
+            self.samples_averaged,
+            network,
+            format,
+            self.filter.is_some() || self.is_tracked,
+        )
     }
 
     /// Result with this name, if it is known.
@@ -145,7 +154,8 @@ impl Point {
         let filter = self.filter.map_or(String::new(), |filter| {
             format!(", filter of {:.1} ms", filter.time_constant_ms)
         });
-        format!("{}, K = {}{readings}{filter}", self.way(), self.centres)
+        let tracked = if self.is_tracked { ", tracked" } else { "" };
+        format!("{}, K = {}{readings}{filter}{tracked}", self.way(), self.centres)
     }
 }
 

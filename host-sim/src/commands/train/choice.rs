@@ -51,7 +51,8 @@ pub fn choose(
     let features = set.choose(options, &Terminal::new(common));
     // No reading model changes an error.
     let (refine, relative_inputs) = (set.refine, set.frames.relative_inputs);
-    let how = Training { options: *options, refine, relative_inputs, reading_model: None };
+    let how =
+        Training { options: *options, refine, relative_inputs, reading_model: None, track: false };
     let data = match subject {
         Subject::Measured(data) => Measurements { how, ..(**data).clone() },
         Subject::Scene(scene) => {

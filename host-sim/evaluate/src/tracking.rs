@@ -1,0 +1,238 @@
+//! The tracker of a scene: how its contacts move, and what they do to its readings.
+
+use taxel_core::track::{LATENTS, RATES, Settings, Sizes, Tracker};
+use taxel_data::BadValue;
+use taxel_learn::ModelBlob;
+use taxel_learn::tracked::Shares;
+use taxel_simulate::World;
+use taxel_simulate::path::Path;
+use taxel_simulate::sensor::{Sensor, Vector3};
+
+use crate::error::Result;
+
+/// Depths, directions and ratios of shear at which a reading's change is fitted.
+const DEPTHS: usize = 12;
+const DIRECTIONS: usize = 8;
+const RATIOS: usize = 3;
+
+/// Rate in 1/s at which contacts slide and are pressed whose motion a scene does not tell.
+const USUAL_SLIDE_PER_S: f64 = 8.0;
+const USUAL_PRESS_PER_S: f64 = 20.0;
+
+/// Variance that a quantity of a contact gains in a second, as a share of the square of its range, and that of its form.
+const DRIFT: f64 = 0.005_5;
+const FORM_DRIFT: f64 = 0.01;
+
+/// Standard deviation of a contact's form at the start (ln a/2, b, ln p), and the largest of each.
+const FORM: [[f64; 2]; 3] = [[0.25, 0.6], [0.2, 0.6], [0.2, 0.9]];
+
+/// The model in `blob` with the tracker of this world.
+///
+/// # Errors
+/// [`Error`](crate::Error) for a motion without a single contact, and outputs that are no deformations.
+pub fn add(blob: &ModelBlob, world: &World) -> Result<ModelBlob> {
+    let sensor = &world.sensor;
+    let sizes = Sizes {
+        rows: world.read_rows.len(),
+        electrodes: sensor.electrodes_per_row_wire,
+        columns: sensor.column_wires,
+    };
+    let shape = blob.parse().shape();
+    let fits = [shape.rows, shape.inputs] == [sizes.rows, sizes.columns];
+    if !fits || !sizes.has_outputs(shape.outputs) {
+        let rule = "a tracker is of outputs that are deformations, along z or along x, y and z; leave one of them out";
+        return Err(BadValue::new("training.track", true, rule).into());
+    }
+    let block = block(world, sizes)?;
+    let tracker = Tracker::new(sizes, &block).map_err(|cause| {
+        BadValue::new("training.track", true, format!("the scene gives no tracker: {cause}"))
+    })?;
+    Ok(blob.with_tracker(tracker)?)
+}
+
+/// The tracker's floats.
+fn block(world: &World, sizes: Sizes) -> Result<Vec<f32>> {
+    let sensor = &world.sensor;
+    let settings = settings(world)?;
+    let shear = f64::from(settings.range[4][1]);
+    let deformations = deformations(f64::from(settings.range[2][1]) / MOST_DEPTH, shear);
+    let shares = Shares::new(&deformations);
+    let (mut rest_ohm, mut places, mut terms) = (vec![], vec![], vec![]);
+    for row in &world.read_rows {
+        let upper = sensor.row_electrodes_mm(*row);
+        let columns = sensor.lower_electrodes_mm.chunks_exact(sensor.electrodes_per_column_wire);
+        let at_rest: Vec<f64> = columns
+            .clone()
+            .map(|column| upper.iter().map(|at| conductance(at, &[0.0; 3], column)).sum())
+            .collect();
+        rest_ohm.extend(at_rest.iter().map(|sum| (sensor.resistance_ohm_per_mm / sum) as f32));
+        for at in upper {
+            places.extend([at[0] as f32, at[1] as f32]);
+            for (column, of_cell) in columns.clone().zip(&at_rest) {
+                let rest = conductance(at, &[0.0; 3], column);
+                let change = |moved: &Vector3| (conductance(at, moved, column) - rest) / of_cell;
+                terms.extend(shares.fit(deformations.iter().map(change).collect()));
+            }
+        }
+    }
+    let block = [settings.floats().to_vec(), rest_ohm, places, terms].concat();
+    debug_assert_eq!(block.len(), sizes.block_floats());
+    Ok(block)
+}
+
+/// Conductance times g of an electrode at `at` that moved, to the electrodes of a column.
+fn conductance(at: &Vector3, moved: &Vector3, column: &[Vector3]) -> f64 {
+    let to = |lower: &Vector3| {
+        let d = [0, 1, 2].map(|axis| at[axis] - moved[axis] - lower[axis]);
+        1.0 / (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]).sqrt()
+    };
+    column.iter().map(to).sum()
+}
+
+/// Deformations of an electrode, down to `deepest_mm`, with shear up to this ratio.
+fn deformations(deepest_mm: f64, most_shear: f64) -> Vec<Vector3> {
+    let of = |place: usize, count: usize| (place as f64 + 0.5) / count as f64;
+    let mut all = vec![];
+    for depth in 0..DEPTHS {
+        for direction in 0..DIRECTIONS {
+            for ratio in 0..RATIOS {
+                let mm = deepest_mm * of(depth, DEPTHS);
+                let angle = std::f64::consts::TAU * of(direction, DIRECTIONS);
+                let along = mm * most_shear * of(ratio, RATIOS);
+                all.push([along * angle.cos(), along * angle.sin(), mm]);
+            }
+        }
+    }
+    all
+}
+
+/// Most that a depth may be, over the deepest of the scene.
+const MOST_DEPTH: f64 = 1.2;
+
+/// How contacts of this world move.
+fn settings(world: &World) -> Result<Settings> {
+    let Some(press) = world.motion.as_press() else {
+        let rule = "a tracker is of one contact, and the scene's deformation has none";
+        return Err(BadValue::new("training.track", true, rule).into());
+    };
+    let ([[low, high], ..], [_, deepest], [_, shear]) =
+        (press.quantities, press.dent_depth_mm, press.shear_ratio);
+    let (slides, presses) = smooth(&world.sensor, world.path.as_ref(), deepest);
+    let width = high - low;
+    let [x_mm, y_mm, _] = world.sensor.size_mm;
+    let pitch_mm = x_mm / world.sensor.electrodes_per_row_wire as f64;
+    let shear_drift = DRIFT * (2.0 * shear).powi(2);
+    let walks =
+        [DRIFT * width * width, shear_drift, shear_drift, FORM_DRIFT, FORM_DRIFT, FORM_DRIFT];
+    let place = 0.5 * pitch_mm;
+    // Standard deviation at a start, where it starts, and the range.
+    let latents: [[f64; 4]; LATENTS] = [
+        [place, 0.5 * x_mm, 0.0, x_mm],
+        [place, 0.5 * y_mm, 0.0, y_mm],
+        [0.15 * deepest, 0.0, -0.1 * deepest, MOST_DEPTH * deepest],
+        [(width / 12.0_f64.sqrt()).max(0.05 * high), 0.5 * (low + high), 0.85 * low, 1.1 * high],
+        [(0.4 * shear).max(1e-3), 0.0, -shear, shear],
+        [(0.4 * shear).max(1e-3), 0.0, -shear, shear],
+        [FORM[0][0], 0.0, -FORM[0][1], FORM[0][1]],
+        [FORM[1][0], 0.0, -FORM[1][1], FORM[1][1]],
+        [FORM[2][0], 0.0, -0.5, FORM[2][1]],
+    ];
+    let noise = world.noise.total_level().max(1e-4);
+    let narrow = |numbers: [f64; 3]| numbers.map(|number| number as f32);
+    Ok(Settings {
+        noise: noise as f32,
+        smooth: [narrow(slides[0]), narrow(slides[1]), narrow(presses)],
+        walks: walks.map(|walk| walk as f32),
+        start: latents.map(|[deviation, usual, ..]| [deviation as f32, usual as f32]),
+        range: latents.map(|[.., least, most]| [least as f32, most as f32]),
+    })
+}
+
+/// Rate, standard deviation and mean of x, y and depth.
+fn smooth(sensor: &Sensor, path: Option<&Path>, deepest: f64) -> ([[f64; 3]; 2], [f64; 3]) {
+    let _: [(); RATES] = [(); 3];
+    let [x_mm, y_mm, _] = sensor.size_mm;
+    let (slide, press) = path.map_or((USUAL_SLIDE_PER_S, USUAL_PRESS_PER_S), |path| {
+        let middle = |[low, high]: [f64; 2]| 0.5 * (low + high);
+        let length = 0.25 * x_mm.hypot(y_mm);
+        let press = std::f64::consts::TAU * middle(path.press_rate_hz);
+        ((middle(path.speed_mm_per_s) / length).max(1.0), press.max(1.0))
+    });
+    let of_axis = |mm: f64| [slide, 0.2 * mm, 0.5 * mm];
+    ([of_axis(x_mm), of_axis(y_mm)], [press, 0.35 * deepest, 0.25 * deepest])
+}
+
+#[cfg(test)]
+mod tests {
+    use taxel_data::Silent;
+
+    use super::*;
+    use crate::evaluate::moving_contacts::MovingContacts;
+    use crate::experiment::Experiment;
+
+    /// A model of the scene `moving` with a tracker, in the time that a test has.
+    fn trained() -> (Experiment, ModelBlob) {
+        let mut scene = Experiment::load("moving").unwrap();
+        scene.world.path.as_mut().unwrap().trajectories = 8;
+        (scene.frames, scene.training.refine, scene.training.track) = (2000, false, true);
+        let blob = scene.train(&Silent).unwrap();
+        (scene, blob)
+    }
+
+    /// RMSE in mm of the model alone, behind a filter, and tracked, on contacts of the scene that move.
+    fn errors(scene: &Experiment, blob: &ModelBlob) -> [f64; 3] {
+        let moving = MovingContacts::new(scene, blob, &[]).unwrap().unwrap();
+        let [plain, filtered, tracked] = &moving.ways[..] else { panic!("three ways") };
+        assert!(tracked.is_tracked && !filtered.is_tracked);
+        [plain, filtered, tracked].map(|way| way.errors[0].rmse)
+    }
+
+    #[test]
+    fn a_contact_that_moves_is_tracked_to_less_than_half_of_a_filters_error() {
+        let (mut scene, blob) = trained();
+        let [_, filtered, tracked] = errors(&scene, &blob);
+        assert!(tracked < 0.5 * filtered && tracked < 0.018, "{tracked} {filtered}");
+        // Contacts of other forms, which neither has met.
+        for other in ["punch", "ellipse", "tail"] {
+            let of_name = scene.others.iter().find(|it| it.name.contains(other));
+            let deformation = of_name.unwrap_or_else(|| panic!("{other}")).deformation.clone();
+            let own = std::mem::replace(&mut scene.world.motion, deformation);
+            let [_, filtered, tracked] = errors(&scene, &blob);
+            assert!(tracked < filtered, "{other}: {tracked} {filtered}");
+            scene.world.motion = own;
+        }
+    }
+
+    #[test]
+    fn shares_tell_readings_to_a_fifth_of_a_per_mille() {
+        let sensor = Sensor::paper();
+        let column = &sensor.lower_electrodes_mm[27..30];
+        let deformations = deformations(1.0, 0.5);
+        let shares = Shares::new(&deformations);
+        for at in sensor.row_electrodes_mm(3) {
+            let rest = conductance(at, &[0.0; 3], column);
+            let all = 6.0 * rest;
+            let change = |moved: &Vector3| (conductance(at, moved, column) - rest) / all;
+            let fitted = shares.fit(deformations.iter().map(change).collect()).map(f64::from);
+            for [x, y, z] in [[0.1, 0.05, 0.7], [-0.2, 0.1, 0.5], [0.0, 0.0, 0.02]] {
+                let terms = [x, y, z, x * x, x * y, x * z, y * y, y * z, z * z];
+                let found: f64 = fitted.iter().zip(terms).map(|(share, term)| share * term).sum();
+                let expected = change(&[x, y, z]);
+                assert!((found - expected).abs() < 2e-4, "{x} {y} {z}: {found} {expected}");
+            }
+        }
+    }
+
+    #[test]
+    fn scenes_without_a_single_contact_or_deformations_have_no_tracker() {
+        for (name, words) in
+            [("paper", "of one contact"), ("contact", "outputs that are deformations")]
+        {
+            let mut scene = Experiment::load(name).unwrap();
+            (scene.frames, scene.training.refine, scene.training.track) = (500, false, true);
+            scene.training.options.centres = 4;
+            let refused = scene.train(&Silent).unwrap_err().to_string();
+            assert!(refused.contains(words), "{refused}");
+        }
+    }
+}

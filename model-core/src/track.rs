@@ -1,0 +1,340 @@
+//! Tracking of a contact: an extended Kalman filter on what a contact is, not on what each electrode does.
+//!
+//! A contact has a place (x, y), a depth, a radius, a shear, and a [form](dent). They move smoothly
+//! ([`Walk`](walk)), and fix the deformation of every electrode, and with it every [reading](readings). A frame corrects
+//! the state by its innovation, each row at the time at which it was read (Bar-Shalom, Li and Kirubarajan, *Estimation
+//! with Applications to Tracking and Navigation*, 2001, §10.3; iterated as in Bell and Cathey, "The iterated Kalman filter
+//! update as a Gauss–Newton method", IEEE Transactions on Automatic Control 38, 1993). Errors are kept as a root L of the
+//! covariance P = LLᵀ, so that f32 is enough.
+//!
+//! A network starts the tracker, and again wherever readings are not explained: of both states, the one stays that explains
+//! the frame better. It also gives the estimate where neither does.
+//!
+//! The blob tells a noise to begin with. How far readings scatter, less where samples are averaged and more by gains that are a
+//! little off or a contact of another form, the tracker learns as a level, and trusts each reading accordingly.
+
+mod linear;
+mod dent;
+mod walk;
+mod readings;
+#[cfg(test)]
+mod tests;
+
+use core::mem;
+
+use crate::estimate::{Estimate, RowStatus};
+use crate::rbf::NetworkError;
+use dent::Dent;
+use linear::{Matrix, Vector, ZERO, cholesky, dot, solve_lower, transpose};
+use readings::Frame;
+
+pub use readings::{Sizes, TERMS};
+pub use walk::{LATENTS, Latents, RATES, Settings};
+
+/// Numbers of the state: latents, and the rates of the first three.
+pub const NUMBERS: usize = LATENTS + RATES;
+
+/// Most corrections by a frame that follows another, and by the first one.
+const ITERATIONS: usize = 2;
+const FIRST_ITERATIONS: usize = 4;
+
+/// Mean square of residuals, over its level, below which one correction will do: the contact was where it was expected.
+const AS_EXPECTED: f32 = 1.2;
+
+/// Standard deviations of the mean square of residuals above its level from which a frame is not explained.
+const NOT_EXPLAINED: f32 = 6.0;
+
+/// Time in s over which the level of residuals is learnt, and its bounds.
+const LEVEL_S: f32 = 0.5;
+const LEVELS: [f32; 2] = [1e-3, 1e3];
+
+/// Frames at a start in which the level is learnt by such a share of each: until the state has settled.
+const YOUNG: u32 = 16;
+const YOUNG_SHARE: f32 = 0.3;
+
+/// Most that residuals count over their level, so that frames that no contact explains do not teach that readings scatter.
+const MOST_OVER: f32 = 3.0;
+
+/// Longest time in s between two frames of one trajectory.
+const LONGEST_GAP_S: f32 = 0.5;
+
+/// How contacts move and what they do to readings, borrowed from a blob.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Tracker<'a> {
+    sizes: Sizes,
+    /// All floats of the blob, and those of the [`Settings`].
+    block: &'a [f32],
+    settings: &'a [f32; Settings::FLOATS],
+    /// Resistance of each cell at rest.
+    rest_ohm: &'a [f32],
+    /// Place of each electrode, row after row.
+    places_mm: &'a [[f32; 2]],
+    /// [Shares](readings) of each electrode and column.
+    shares: &'a [[f32; readings::TERMS]],
+}
+
+/// What a tracker remembers between the frames of a trajectory, and its working memory: some 3 kB.
+#[derive(Debug, Clone, PartialEq)]
+pub struct State {
+    now: Contact,
+    /// Room for a contact that the network starts.
+    other: Contact,
+    /// Whether there is a contact now.
+    is_known: bool,
+    work: [Matrix; 3],
+}
+
+/// A contact as it is known, and when.
+#[derive(Debug, Clone, PartialEq)]
+struct Contact {
+    mean: Vector,
+    /// L of the covariance LLᵀ.
+    root: Matrix,
+    at_us: u64,
+    /// Mean square of residuals over that of the noise that the blob tells, slowly averaged over so many frames.
+    level: f32,
+    frames: u32,
+}
+
+impl Default for State {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl State {
+    /// Before the first frame.
+    pub const fn new() -> Self {
+        const NOTHING: Contact =
+            Contact { mean: [0.0; NUMBERS], root: ZERO, at_us: 0, level: 1.0, frames: 0 };
+        Self { now: NOTHING, other: NOTHING, is_known: false, work: [ZERO; 3] }
+    }
+
+    /// Lets the next frame be the first one.
+    pub fn restart(&mut self) {
+        self.is_known = false;
+    }
+}
+
+/// When a frame was read, and how far ahead its estimate is to be.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Times<'t> {
+    /// Start of the frame in µs, by a clock of any start.
+    pub start_us: u64,
+    /// Time in µs from there to the middle of each row's readings.
+    pub row_us: &'t [f32],
+    /// Time in µs from the start for which outputs are expected.
+    pub ahead_us: f32,
+}
+
+impl<'a> Tracker<'a> {
+    /// Makes one of the floats in `block`: [`Settings`], and then rest, places and shares.
+    ///
+    /// # Errors
+    /// [`NetworkError::Length`] for another number of floats than `sizes` tell, [`NetworkError::NotFinite`] for one that is
+    /// NaN or infinite.
+    pub fn new(sizes: Sizes, block: &'a [f32]) -> Result<Self, NetworkError> {
+        const WHAT: &str = "tracker";
+        let (expected, found) = (sizes.block_floats(), block.len());
+        let wrong = NetworkError::Length { what: WHAT, expected, found };
+        if found != expected {
+            return Err(wrong);
+        }
+        if !block.iter().all(|number| number.is_finite()) {
+            return Err(NetworkError::NotFinite { what: WHAT });
+        }
+        let (settings, rest) = block.split_first_chunk().ok_or(wrong)?;
+        let (rest_ohm, rest) = rest.split_at_checked(sizes.cells()).ok_or(wrong)?;
+        let (places, shares) = rest.split_at_checked(2 * sizes.all_electrodes()).ok_or(wrong)?;
+        Ok(Self {
+            sizes,
+            block,
+            settings,
+            rest_ohm,
+            places_mm: places.as_chunks().0,
+            shares: shares.as_chunks().0,
+        })
+    }
+
+    /// How contacts move.
+    pub fn settings(&self) -> Settings {
+        Settings::of_floats(self.settings)
+    }
+
+    /// Its floats.
+    pub fn block(&self) -> &'a [f32] {
+        self.block
+    }
+
+    /// Sizes of the sensor.
+    pub fn sizes(&self) -> Sizes {
+        self.sizes
+    }
+
+    /// Corrects the `state` by a frame, and writes outputs over the `estimate` that a network has made of it: unless the
+    /// tracker cannot explain the frame. Returns whether it did.
+    ///
+    /// `readings_ohm` are all cells, row after row; one that is NaN does not count. `reciprocals` are one over each reading of
+    /// the baseline, in place of the resistances at rest that the blob has.
+    pub fn track(
+        &self,
+        state: &mut State,
+        readings_ohm: &[f32],
+        reciprocals: Option<&[f32]>,
+        times: Times<'_>,
+        estimate: &mut Estimate<'_>,
+    ) -> bool {
+        let settings = &self.settings();
+        let middle_us = times.row_us.iter().sum::<f32>() / times.row_us.len().max(1) as f32;
+        let at_us = times.start_us.saturating_add(middle_us as u64);
+        let frame = Frame { readings_ohm, reciprocals, row_us: times.row_us, middle_us };
+        let State { now, other, is_known, work } = state;
+        let gap_s = Some(&*now).filter(|_| *is_known).and_then(|now| now.gap_s(at_us));
+        *is_known = false;
+        let (level, frames) = gap_s.map_or((1.0, 0), |_| (now.level, now.frames));
+        // Squares of normal numbers, each of variance 2.
+        let deviation = libm::sqrtf(2.0 / self.sizes.cells() as f32);
+        let is_explained = |residual: f32| residual < (1.0 + NOT_EXPLAINED * deviation) * level;
+        let mut residual = f32::INFINITY;
+        if let Some(gap_s) = gap_s {
+            settings.predict(now, gap_s, work);
+            now.at_us = at_us;
+            residual = self.correct(settings, now, &frame, ITERATIONS, work);
+        }
+        if !is_explained(residual) {
+            self.start(settings, estimate, other);
+            (other.at_us, other.level) = (at_us, level);
+            let anew = self.correct(settings, other, &frame, FIRST_ITERATIONS, work);
+            if anew < residual || residual.is_nan() {
+                mem::swap(now, other);
+                residual = anew;
+            }
+        }
+        if !residual.is_finite() || !now.mean.iter().all(|number| number.is_finite()) {
+            return false;
+        }
+        let learnt = learnt_level(level, residual, gap_s.unwrap_or(0.0), frames);
+        (now.level, now.frames) = (learnt.clamp(LEVELS[0], LEVELS[1]), frames.saturating_add(1));
+        *is_known = true;
+        if is_explained(residual) {
+            let ahead_s = (times.ahead_us - middle_us) * 1e-6;
+            self.write(&settings.mean_after(&now.mean, ahead_s), estimate);
+        }
+        is_explained(residual)
+    }
+
+    /// Corrects a state by a frame of its time. Returns the mean square of residuals before the last correction, over that of
+    /// the noise.
+    fn correct(
+        &self,
+        settings: &Settings,
+        contact: &mut Contact,
+        frame: &Frame<'_>,
+        iterations: usize,
+        [information, columns, product]: &mut [Matrix; 3],
+    ) -> f32 {
+        settings.keep_in_range(&mut contact.mean);
+        let (prior, weight) = (contact.mean, 1.0 / contact.level);
+        transpose(&contact.root, columns);
+        let mut last = f32::NAN;
+        for iteration in 0..iterations {
+            if iteration == 1 && last < AS_EXPECTED * contact.level {
+                break;
+            }
+            let mut gradient = [0.0; NUMBERS];
+            last = self.inform(settings.noise, &contact.mean, frame, information, &mut gradient);
+            let moved: Vector = core::array::from_fn(|at| contact.mean[at] - prior[at]);
+            for (row, gradient) in information.iter_mut().zip(&mut gradient) {
+                *gradient = weight * (*gradient + dot(row, &moved));
+                row.iter_mut().for_each(|number| *number *= weight);
+            }
+            // I + Lᵀ·M·L and its root C: the covariance becomes L·(C·Cᵀ)⁻¹·Lᵀ.
+            for (of_product, column) in product.iter_mut().zip(&*columns) {
+                *of_product = core::array::from_fn(|at| dot(&information[at], column));
+            }
+            let inner = &mut *information;
+            for row in 0..NUMBERS {
+                for column in 0..=row {
+                    inner[row][column] = dot(&product[row], &columns[column]);
+                }
+                inner[row][row] += 1.0;
+            }
+            cholesky(inner);
+            let right: Vector = core::array::from_fn(|place| dot(&columns[place], &gradient));
+            let step = solve_lower(inner, &right);
+            for (place, row) in contact.root.iter_mut().enumerate() {
+                let before: Vector = core::array::from_fn(|at| columns[at][place]);
+                *row = solve_lower(inner, &before);
+                contact.mean[place] = prior[place] + dot(row, &step);
+            }
+            settings.keep_in_range(&mut contact.mean);
+        }
+        last
+    }
+
+    /// Makes the `contact` one as the network sees it.
+    fn start(&self, settings: &Settings, estimate: &Estimate<'_>, contact: &mut Contact) {
+        let Contact { mean, root, .. } = contact;
+        (*mean, *root) = ([0.0; NUMBERS], ZERO);
+        for (place, [deviation, usual]) in walk::PLACES.into_iter().zip(settings.start) {
+            (mean[place], root[place][place]) = (usual, deviation);
+        }
+        for (axis, [rate, deviation, _]) in settings.smooth.into_iter().enumerate() {
+            root[2 * axis + 1][2 * axis + 1] = rate * deviation;
+        }
+        let (mut sum, mut deepest, mut moment) = (0.0, 0.0_f32, [0.0; 2]);
+        for (place_mm, mm) in self.places_mm.iter().zip(self.depths(estimate)) {
+            let mm = if *mm > 0.0 { *mm } else { 0.0 }; // NaN as well
+            sum += mm;
+            deepest = deepest.max(mm);
+            moment = [moment[0] + mm * place_mm[0], moment[1] + mm * place_mm[1]];
+        }
+        if sum > 0.0 {
+            (mean[0], mean[2], mean[4]) = (moment[0] / sum, moment[1] / sum, deepest);
+        }
+    }
+
+    /// Depth of each electrode in an estimate: the last output of each.
+    fn depths<'e>(&self, estimate: &'e Estimate<'_>) -> impl Iterator<Item = &'e f32> {
+        let axes = self.axes(estimate);
+        estimate.outputs.iter().skip(axes - 1).step_by(axes)
+    }
+
+    /// Number of outputs of an electrode: z alone, or x, y and z.
+    fn axes(&self, estimate: &Estimate<'_>) -> usize {
+        let axes = estimate.outputs.len().checked_div(self.sizes.all_electrodes());
+        axes.unwrap_or(0).max(1)
+    }
+
+    /// Writes the deformation of every electrode.
+    fn write(&self, mean: &Vector, estimate: &mut Estimate<'_>) {
+        let mut latents = walk::PLACES.map(|place| mean[place]);
+        latents[2] = latents[2].max(0.0);
+        let (dent, axes) = (Dent::new(latents), self.axes(estimate));
+        for (outputs, place) in estimate.outputs.chunks_exact_mut(axes).zip(self.places_mm) {
+            let mm = dent.at(*place).mm;
+            let of_axes = [latents[4] * mm, latents[5] * mm, mm];
+            let from = of_axes.len().saturating_sub(axes);
+            outputs.iter_mut().zip(of_axes.iter().skip(from)).for_each(|(to, mm)| *to = *mm);
+        }
+        estimate.status.fill(RowStatus::Decoded);
+    }
+}
+
+/// Level of residuals after a frame, `gap_s` behind the one before, of so many `frames` so far.
+fn learnt_level(level: f32, residual: f32, gap_s: f32, frames: u32) -> f32 {
+    let share = match frames {
+        0 => return residual,
+        1..YOUNG => YOUNG_SHARE,
+        _ => (gap_s / LEVEL_S).min(1.0),
+    };
+    level + share * (residual.min(MOST_OVER * level) - level)
+}
+
+impl Contact {
+    /// Time in s from this state to `at_us`; `None` if it is none, or too long.
+    fn gap_s(&self, at_us: u64) -> Option<f32> {
+        let gap_s = at_us.checked_sub(self.at_us)? as f32 * 1e-6;
+        (gap_s <= LONGEST_GAP_S).then_some(gap_s)
+    }
+}
