@@ -412,6 +412,9 @@ mod tests {
         let without = circuit.load(columns, &idle, 4095, &open) / load;
         let share = 1.0 / row()[5] / row().iter().map(|ohm| 1.0 / ohm).sum::<f64>();
         assert!((f64::from(without) - (1.0 - share)).abs() < 1e-6, "{without}");
+        let mut failed = sampled;
+        failed[2] = f32::NAN;
+        assert!(read(&failed, &idle, load) < 5e-3, "one that is read could not be sampled");
         // Nothing is known of a row without current.
         assert_eq!(circuit.load(columns, &idle, 4095, &idle), 6.0);
         // Nor of one with a short.

@@ -399,3 +399,17 @@ fn a_scan_drives_only_the_rows_that_it_is_asked_for_and_reads_each_column_at_its
     CIRCUIT.correct(wires.columns, &mut expected);
     assert_eq!(frame, [expected[0], expected[1], 7.0]);
 }
+
+#[test]
+fn the_load_of_a_row_is_measured_again_whatever_its_number() {
+    let (record, mut scanner) = scanner();
+    let once = ScanSettings { oversampling: 1, ..SETTINGS };
+    let wires = Selection { rows: &[RowWire(1)], columns: ColumnWires(0b110) };
+    let mut samples = || {
+        record.take();
+        scanner.scan(once, wires, &mut [0.0; 2]);
+        record.transfers()
+    };
+    let counts: Vec<usize> = (0..=SCANS_A_ROUND).map(|_| samples()).collect();
+    assert_eq!((counts[0], counts[1], counts[usize::from(SCANS_A_ROUND)]), (6, 2, 6));
+}

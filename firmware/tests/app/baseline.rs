@@ -88,6 +88,12 @@ fn a_baseline_that_will_not_come_is_refused_and_one_that_comes_is_counted_once()
     assert_eq!(host.answers(10), [refused.as_str()]);
     host.send(12, &Request::Configure(quiet()));
     assert_eq!(host.answers(11), [refused.as_str()]);
+    // As does one with other scans.
+    host.send(16, &Request::Configure(every(100)));
+    host.send(17, &Request::CaptureBaseline { frames: 1000 });
+    host.send(18, &Request::Configure(every(200)));
+    assert_eq!(host.answers(17), [refused.as_str()]);
+    host.send(19, &Request::Configure(quiet()));
     host.send(13, &Request::CaptureBaseline { frames: 1 });
     assert_eq!(host.answers(13), [refused.as_str()]);
     // The same request again goes on counting, and another under its number starts anew.

@@ -188,10 +188,10 @@ mod tests {
     }
 
     #[test]
-    fn a_contact_that_moves_is_tracked_to_less_than_half_of_a_filters_error() {
+    fn a_contact_that_moves_is_tracked_to_two_thirds_of_a_filters_error() {
         let (mut scene, blob) = trained();
         let [_, filtered, tracked] = errors(&scene, &blob);
-        assert!(tracked < 0.5 * filtered && tracked < 0.018, "{tracked} {filtered}");
+        assert!(tracked < 0.66 * filtered && tracked < 0.018, "{tracked} {filtered}");
         // Contacts of other forms, which neither has met.
         for other in ["punch", "ellipse", "tail"] {
             let of_name = scene.others.iter().find(|it| it.name.contains(other));

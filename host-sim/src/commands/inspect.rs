@@ -10,6 +10,7 @@ use crate::verdict::Warning;
 use clap::Args;
 use serde_json::json;
 use taxel_core::blob::{Metadata, Model};
+use taxel_evaluate::device::BOARD_CLOCK_MHZ;
 use taxel_firmware::capacity::Capacity;
 use taxel_firmware::timing::ScanPlan;
 use taxel_learn::ModelBlob;
@@ -154,8 +155,10 @@ fn costs(result: &mut Sections, blob: &ModelBlob, model: &Model<'_>, design: &De
     let cost = Cost::of_frame(design);
     result.value("frame_cost", &cost);
     let Cost { instructions, cycles } = cost;
-    let us = cycles as f64 / 168.0;
-    let text = format!("{instructions} instructions, {cycles} cycles ({us:.0} µs at 168 MHz)");
+    let us = cycles as f64 / BOARD_CLOCK_MHZ;
+    let text = format!(
+        "{instructions} instructions, {cycles} cycles ({us:.0} µs at {BOARD_CLOCK_MHZ} MHz)"
+    );
     result.line("a frame", text);
 }
 

@@ -50,6 +50,15 @@ fn outliers_are_named_left_out_and_listed_in_json() {
     assert_eq!(summary["training_frames"], 398);
     assert_eq!(summary["outliers"]["found"][1]["column"], "b");
     assert_eq!(summary["outliers"]["lines"], 2);
+    // Lines are counted, not values.
+    let mut more = lines(1500);
+    (0..7).for_each(|line| more[50 * line + 9] = [1e6, 1e6, 0.5]);
+    write(&folder, "more.csv", &more);
+    let (_, notes) = train(&folder, "more.csv", &["--centres", "8"]);
+    assert!(
+        notes.contains("7 of 1500 lines of more.csv") && notes.contains("and 2 more lines"),
+        "{notes}"
+    );
 
     let rmse = |name: &str, more: &[&str]| {
         train(&folder, name, &[&["--centres", "8"], more].concat());

@@ -201,6 +201,14 @@ fn choice_and_knee_are_those_worked_out_by_hand() {
     assert_eq!(chosen(&[("rmse_dz_mm", Most(0.11)), ("blob_bytes", Most(400.0))]), 1);
     assert_eq!(chosen(&[("frame_ms", Most(49.0))]), 4);
     assert_eq!(chosen(&[("frame_ms", Most(1.0)), ("cycles", Least { least: 60.0 })]), 5);
+    // With the worst case, its bound alone is one on errors: of those within it the cheapest, however accurate others are.
+    trade.worst_case = true;
+    for (point, (.., rmse)) in trade.points.iter_mut().zip(rows) {
+        point.results.insert("worst_rmse_dz_mm".into(), rmse);
+    }
+    trade.choose(&at_most("worst_rmse_dz_mm", 0.11)).unwrap();
+    assert_eq!(trade.chosen, Some(4));
+    trade.worst_case = false;
     // A blob fits a slot, unless another bound on it is given.
     trade.points[2].results.insert("blob_bytes".into(), 131_073.0);
     assert!(trade.choose(&at_most("rmse_dz_mm", 0.1)).is_err());

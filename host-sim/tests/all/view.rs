@@ -317,7 +317,7 @@ fn a_line_that_was_lost_is_opened_again_and_meanwhile_the_page_says_what_is_wron
     let folder = Folder::new("view_reconnects");
     let port = folder.path("port");
     // A port that is unplugged and plugged in again: a link to one terminal after another.
-    let plug = |line: &'static [u8]| {
+    let plug = |lines: [&'static [u8]; 2]| {
         let (name, near, mut far) = terminal();
         drop(near);
         let _ = std::fs::remove_file(&port);
@@ -325,27 +325,30 @@ fn a_line_that_was_lost_is_opened_again_and_meanwhile_the_page_says_what_is_wron
         let (stop, stopped) = std::sync::mpsc::channel::<()>();
         std::thread::spawn(move || {
             let wait = Duration::from_millis(5);
+            let mut lines = lines.iter().cycle();
             while stopped.recv_timeout(wait) == Err(std::sync::mpsc::RecvTimeoutError::Timeout) {
-                let _ = far.write_all(line);
+                let _ = far.write_all(lines.next().unwrap());
             }
         });
         stop
     };
-    let plugged = plug(b"1,2,3\n");
-    let page = Page::of(&folder, &[port.to_str().unwrap(), "--protocol", "csv"]);
+    let plugged = plug([b"1,2,3\n", b"1,2\n"]);
+    let shape = ["--protocol", "csv", "--shape", "1x3"];
+    let page = Page::of(&folder, &[&[port.to_str().unwrap()][..], &shape].concat());
     let mut events = page.events();
-    events.any("frame");
+    events.next("status", |status| status["lost"].as_f64() > Some(0.0)); // lines that are cut
     drop(plugged);
     let status = events.next("status", |status| status["state"].as_str() == Some("no data"));
     let said = status["message"].as_str().unwrap();
     assert!(said.contains("no data from ") && said.contains("is the cable in"), "{said}");
-    let plugged = plug(b"of another speed");
+    let plugged = plug([b"of another speed"; 2]);
     let is_noise = |status: &Value| status["message"].as_str().unwrap().contains(" bytes came");
     events.next("status", is_noise);
     drop(plugged);
     events.next("status", |status| status["message"].as_str().unwrap().contains("no data from "));
-    let _plugged = plug(b"1,2,3\n");
-    events.next("status", |status| status["state"].as_str() == Some("live"));
+    let _plugged = plug([b"1,2,3\n"; 2]);
+    let status = events.next("status", |status| status["state"].as_str() == Some("live"));
+    assert!(status["lost"].as_f64() >= Some(1.0), "lines that were cut at first: {status:?}");
     let frame = events.any("frame");
     assert_eq!(numbers(&frame["readings"]), [1.0, 2.0, 3.0]);
     page.end();

@@ -268,3 +268,16 @@ fn a_reading_that_never_changed_is_filled_with_its_mean() {
     assert_eq!(model.fill(&mut frame, None, &mut [0.0; 7]), 1);
     assert_eq!(frame[2], 60.0);
 }
+
+#[test]
+fn readings_without_a_baseline_count_among_the_missing() {
+    let (_, block) = fills(12, 3, 3);
+    let model = ReadingModel::new(sizes(12, 3), &block).unwrap();
+    let mut scratch = vec![0.0; model.sizes().scratch_floats()];
+    let (mut reciprocals, mut frame) = ([1.0; 12], [55.0; 12]);
+    reciprocals[..3].fill(f32::NAN);
+    frame[5] = f32::NAN;
+    assert_eq!(model.fill(&mut frame, Some(&reciprocals), &mut scratch), 0); // four of twelve
+    reciprocals[0] = 1.0;
+    assert_eq!(model.fill(&mut frame, Some(&reciprocals), &mut scratch), 1);
+}

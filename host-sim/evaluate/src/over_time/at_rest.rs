@@ -206,6 +206,12 @@ mod tests {
         assert!((6.3..6.4).contains(&drift.percent), "{}", drift.percent);
         assert_eq!((drift.from, drift.to), (20.0, 1558.0));
         assert_eq!(found.stretches[0].most_percent, 0.0);
+        // One that falls is told in the order of time too.
+        let values = readings.values.iter().map(|value| 1100.0 - value).collect();
+        let falling = Table { values, ..readings.clone() };
+        let of_falling = Rest { readings: falling.clone(), lines: lines() };
+        let found = RestOverTime::new(&of_falling, &clock, &Spread::of(&falling)).unwrap();
+        assert_eq!((found.drifts[0].from, found.drifts[0].to), (20.0, 1558.0));
         // It is none where presses move the readings far more, or where few readings drift.
         let spread = Spread { deviations: vec![400.0; 3], ..Spread::of(&readings) };
         assert_eq!(RestOverTime::new(&rest, &clock, &spread).unwrap().drifts, []);

@@ -219,3 +219,28 @@ fn readings_that_are_too_few_or_no_numbers_are_refused_by_name() {
     bad.values[0] = f64::INFINITY;
     assert!(says(Statistics::fit(&bad, Extent::Fill, 1).map(drop)).contains("are no numbers"));
 }
+
+#[test]
+fn each_frame_is_filled_relative_to_its_own_baseline() {
+    let world = World { read_rows: vec![3, 4], ..World::press() };
+    let names = world.reading_names();
+    let rest = |values: Vec<f64>| Table { names: names.clone(), values: values.into() };
+    let frames = synthesise(&world, Stream::Training, 1500);
+    let frames = crate::relative::dataset(frames, &rest(vec![50.0; 36]));
+    let options = Options { centres: 8, ..Options::of_rows() };
+    let trained = train(&frames, &options, &Silent).unwrap();
+    let blob = pack(&trained, &frames, &Origin::of_data("rows", 0, 1, &frames)).unwrap();
+    let statistics = Statistics::fit(&frames.inputs, Extent::Fill, 1).unwrap();
+    let blob = add(&blob, &statistics, &HeldOut::default()).unwrap();
+    // The baseline of one reading drifts, which is missing in every frame.
+    let fresh = synthesise(&world, Stream::Test, 150).inputs;
+    let gain = |at: usize| if at % 36 == 4 { 1.0 + 0.01 * (at / 36) as f64 } else { 1.0 };
+    let mut readings: Vec<f64> = (0..150 * 36).map(|it| gain(it) * fresh.values[it]).collect();
+    readings.iter_mut().skip(4).step_by(36).for_each(|reading| *reading = f64::NAN);
+    let baselines = rest((0..150 * 36).map(|it| gain(it) * 50.0).collect());
+    let (filled, _) = blob.prepare().filled(&readings, Some(&baselines)).unwrap();
+    for at in (4..150 * 36).step_by(36) {
+        let error = filled[at] / gain(at) - fresh.values[at];
+        assert!(error.abs() < 2.0, "{at}: {error}");
+    }
+}

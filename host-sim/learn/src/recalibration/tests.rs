@@ -240,3 +240,10 @@ fn what_cannot_be_recalibrated_is_refused_by_name() {
         assert!(said.contains(says), "{said}");
     }
 }
+
+#[test]
+fn a_press_with_one_amount_of_0_is_none_at_rest() {
+    let names = ["fx_n", "fz_n", "contact_x_mm"].map(String::from);
+    assert!(!is_untouched(&names, &[0.0, 1.0, 5.0]));
+    assert!(is_untouched(&names, &[0.0, 0.0, 5.0]));
+}

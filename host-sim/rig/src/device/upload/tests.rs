@@ -151,3 +151,17 @@ fn a_trial_that_nobody_ended_does_not_block_an_upload() {
     assert_eq!(outcome, Ok(UploadState::OnTrial { crc_32: 7 }));
     assert_eq!(received.get(), 8);
 }
+
+#[test]
+fn a_trial_is_prolonged_by_minutes() {
+    let asked = Rc::new(Cell::new(0));
+    let seen = Rc::clone(&asked);
+    let mut device = device(move |request| {
+        if let Request::Upload(UploadStep::Try { trial_ms }) = request {
+            seen.set(*trial_ms);
+        }
+        Report::Upload(UploadState::OnTrial { crc_32: 7 })
+    });
+    prolong_trial(&mut device, 5).unwrap();
+    assert_eq!(asked.get(), 300_000);
+}
