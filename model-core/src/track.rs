@@ -1,7 +1,7 @@
 //! Tracking of a contact: an extended Kalman filter on what a contact is, not on what each electrode does.
 //!
-//! A contact has a place (x, y), a depth, a radius, a shear, and a [form](dent). They move smoothly
-//! ([`Walk`](walk)), and fix the deformation of every electrode, and with it every [reading](readings). A frame corrects
+//! A contact has a place (x, y), a depth, a radius, a shear, and a form. They move smoothly
+//! ([`Settings`]), and fix the deformation of every electrode, and with it every reading. A frame corrects
 //! the state by its innovation, each row at the time at which it was read (Bar-Shalom, Li and Kirubarajan, *Estimation
 //! with Applications to Tracking and Navigation*, 2001, §10.3; iterated as in Bell and Cathey, "The iterated Kalman filter
 //! update as a Gauss–Newton method", IEEE Transactions on Automatic Control 38, 1993). Errors are kept as a root L of the
@@ -69,7 +69,7 @@ pub struct Tracker<'a> {
     rest_ohm: &'a [f32],
     /// Place of each electrode, row after row.
     places_mm: &'a [[f32; 2]],
-    /// [Shares](readings) of each electrode and column.
+    /// Shares of each electrode and column.
     shares: &'a [[f32; readings::TERMS]],
 }
 

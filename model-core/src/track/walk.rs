@@ -13,7 +13,7 @@ pub const LATENTS: usize = 9;
 /// Number of latents that move with a rate: x, y and depth.
 pub const RATES: usize = 3;
 
-/// Place along x and y, depth, radius in mm; shear along x and y over depth; and the [form](super::dent): ln a/2, b, ln p.
+/// Place along x and y, depth, radius in mm; shear along x and y over depth; and the form: ln a/2, b, ln p.
 pub type Latents = [f32; LATENTS];
 
 /// Place of each latent in the state. The rate of one that has a rate follows it.
