@@ -31,9 +31,6 @@ const HEAD: &str = "compiler,model,scope,instructions,predicted";
 /// Scope of the filter in time of a frame's estimate.
 const FILTER: &str = "filter";
 
-/// Scope of tracking a contact, a frame each millisecond.
-const TRACK: &str = "track";
-
 /// Most per cent by which a prediction may be off.
 const PREDICTED_PERCENT: u64 = 10;
 /// Most per cent by which instructions may exceed those accepted for another compiler, which makes other code. Fewer are
@@ -84,13 +81,9 @@ pub fn run(options: &Options) -> Outcome {
 /// Counts the scopes of a model.
 fn measure(model: &Model, image: &Image, files: &Files) -> Outcome<Vec<Figure>> {
     let design = Design::new(&model.blob);
-    let nothing = Cost { instructions: 0, cycles: 0 };
     let figure = |(scope, instructions): (String, u64)| {
         let predicted = match scope.as_str() {
             FILTER => Cost::of_filter(design.shape),
-            TRACK => {
-                model.blob.parse().tracker().map_or(nothing, |it| Cost::of_tracker(it.sizes()))
-            }
             _ => Cost::of_frame(&design),
         };
         Figure { model: model.name(), scope, instructions, predicted: predicted.instructions }

@@ -77,7 +77,7 @@ const FILTER: [f64; 3] = [163.0, 24.0, 26.0];
 const FILTER_CYCLES: f64 = 1.7;
 
 /// Instructions of a tracker whose contact presses all electrodes: of a frame, of each electrode, of each cell, and of each
-/// electrode and column; and cycles of one.
+/// electrode and column; and cycles of one. Counted in QEMU for three sensors; no gate holds them yet.
 const TRACKER: [f64; 4] = [13_000.0, 1_600.0, 270.0, 150.0];
 const TRACKER_CYCLES: f64 = 1.8;
 

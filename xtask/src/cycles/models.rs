@@ -6,7 +6,6 @@ use std::path::{Path, PathBuf};
 use rayon::prelude::*;
 use taxel_core::rbf::Format;
 use taxel_data::{AtRest, Silent, Stream};
-use taxel_evaluate::tracking;
 use taxel_learn::train::{Features, Kinds, train};
 use taxel_learn::{ModelBlob, Options, Origin, pack};
 use taxel_simulate::outputs::{ContactOutput, ElectrodeOutputs, Outputs, Quantity};
@@ -181,24 +180,8 @@ fn made(format: Format, shape: Shape, centres: usize) -> Outcome<Model> {
     let failed = |cause: taxel_learn::Error| format!("{} in {format:?}: {cause}", shape.name());
     let trained = train(&dataset, &options, &Silent).map_err(failed)?;
     let blob = pack(&trained, &dataset, &origin).map_err(failed)?;
-    // A wide one in f32 has no room in a slot.
-    let is_tracked = match shape {
-        Shape::Array => centres == 16,
-        Shape::Mat => true,
-        Shape::Wide => format == Format::Fixed16,
-        _ => false,
-    };
-    let blob = if is_tracked {
-        tracking::add(&blob, &world).map_err(|cause| cause.to_string())?
-    } else {
-        blob
-    };
-    // A tracker's cost is that of the electrodes which a contact presses: of the one that presses most.
-    let pressed = |outputs: &[f64]| outputs.iter().sum::<f64>();
-    let outputs = dataset.outputs.lines().map(pressed).enumerate();
-    let most = outputs.max_by(|(_, a), (_, b)| a.total_cmp(b)).map_or(0, |(line, _)| line);
-    let line = dataset.inputs.lines().nth(if is_tracked { most } else { 0 }).ok_or("no frame")?;
-    let frame = line.iter().map(|it| *it as f32).collect();
+    let frame =
+        dataset.inputs.lines().next().ok_or("no frame")?.iter().map(|it| *it as f32).collect();
     let model = Model { shape, format, centres, blob, frame };
     let as_asked = |network: taxel_core::rbf::Network<'_>| {
         (network.format(), network.shape().centres) == (format, centres)

@@ -14,7 +14,6 @@ use qemu_image::exit;
 use qemu_image::slot::Slot;
 use taxel_core::blob::Model;
 use taxel_core::filter::{Settings, State};
-use taxel_core::track::{self, Times};
 use taxel_core::{Decoder, Estimate, Frame, RowStatus};
 
 use region::{calibrate, region};
@@ -66,19 +65,5 @@ fn main() -> ! {
     region("filter", || {
         black_box(&mut state).filter(black_box(settings), 1000, black_box(&mut estimate));
     });
-    if let Some(tracker) = model.tracker() {
-        let mut state = track::State::new();
-        let row_us = [0.0; MOST_ROWS];
-        let row_us = unwrap!(row_us.get(..shape.rows));
-        let mut track = |start_us| {
-            let times = Times { start_us, row_us, ahead_us: 1000.0 };
-            let tracked =
-                tracker.track(&mut state, black_box(readings), None, times, &mut estimate);
-            assert!(start_us < 20_000 || tracked, "the frame is not explained");
-        };
-        // Until the contact has settled.
-        (0..20).for_each(|frame| track(1000 * frame));
-        region("track", || track(20_000));
-    }
     exit::success()
 }
