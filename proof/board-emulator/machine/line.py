@@ -25,6 +25,8 @@ class HostClock(ctypes.Structure):
 SLEEPS, READS = 1, 2
 #: Looks at the host, while it computes, until there is a pause in s between them; and the longest it may compute.
 QUICK_LOOKS, LOOK_S, LONGEST_S = 100, 50e-6, 300.0
+#: Longest time in s that a reader with a clock of its own is waited for.
+LATE_READER_S = 5.0
 
 
 class Host:
@@ -56,6 +58,8 @@ class Terminal:
         os.set_blocking(self._master, False)
         self.path = os.ttyname(self._slave)
         self._board = board
+        #: Whether somebody reads at the other end, as far as is known.
+        self._is_read = True
         #: The program at the other end, if it lives by the board's clock; else by its own.
         self.host = None
         board.glance = self._pass_on
@@ -69,9 +73,14 @@ class Terminal:
         if count:
             try:
                 del usart.to_host[:os.write(self._master, usart.to_host[:count])]
+                self._is_read = True
             except BlockingIOError:
+                # A reader on a busy computer may be late; without one, what is sent is lost.
                 if self.host is None:
-                    usart.to_host.clear()  # nobody reads
+                    ready = self._is_read and select.select([], [self._master], [], LATE_READER_S)[1]
+                    if not ready:
+                        usart.to_host.clear()
+                        self._is_read = False
         if self.host is not None:
             self._let_host_compute()
         elif idle:
