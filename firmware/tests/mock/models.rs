@@ -87,7 +87,7 @@ pub fn blob_of_a_row(shape: ModelShape, metadata: Metadata<'_>) -> AlignedBytes 
     })
 }
 
-/// The same whose readings have these names, one on each line.
+/// Blob of a model of one row, whose readings have these names, one on each line.
 pub fn blob_of_names(names: &'static str, outputs: usize) -> AlignedBytes {
     let shape = ModelShape { rows: 1, inputs: names.lines().count(), outputs };
     blob_of_a_row(shape, Metadata { input_names: Columns(names), ..Metadata::unnamed(shape) })

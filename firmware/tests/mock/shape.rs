@@ -17,7 +17,7 @@ pub fn frame_at_rest() -> TestFrame {
     [[60.0, 61.0, 62.0], [63.0, 64.0, 65.0]]
 }
 
-/// The same with one other reading.
+/// The frame at rest with one other reading.
 pub fn frame_with(row: usize, column: usize, ohm: f32) -> TestFrame {
     let mut frame = frame_at_rest();
     frame[row][column] = ohm;

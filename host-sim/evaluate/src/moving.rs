@@ -78,8 +78,7 @@ impl Moving {
     /// What a filter with these `settings` makes of the `estimates` of all frames (`frames × outputs`). It starts anew with
     /// each trajectory.
     pub fn filtered(&self, estimates: &[f64], settings: Settings) -> Vec<f64> {
-        let start_us = self.timetable.starts_s.iter().map(|start_s| (start_s * 1e6).round() as u64);
-        let (start_us, outputs) = (start_us.collect::<Vec<u64>>(), self.truth.names.len());
+        let (start_us, outputs) = (self.start_us().collect::<Vec<u64>>(), self.truth.names.len());
         let mut filtered = estimates.to_vec();
         filtered.par_chunks_exact_mut(start_us.len() * outputs).for_each(|trajectory| {
             let mut state = State::new(vec![[0.0; 2]; outputs]);
@@ -91,8 +90,7 @@ impl Moving {
     /// Estimates of all frames by a decoder that is told when each reading was taken.
     pub fn decoded(&self, decoder: &dyn Decoder) -> Vec<f64> {
         let (scans, frames) = (self.timetable.scans(), &self.frames);
-        let start_us = self.timetable.starts_s.iter().map(|start_s| (start_s * 1e6).round() as u64);
-        let start_us: Vec<u64> = start_us.cycle().take(frames.frames()).collect();
+        let start_us: Vec<u64> = self.start_us().cycle().take(frames.frames()).collect();
         let columns = frames.inputs.names.len() / frames.rows;
         let row_us = |row: usize| 1e6 * self.timetable.row_offset_s(row, frames.rows);
         let reading_offset_us: Vec<f64> =
@@ -100,6 +98,11 @@ impl Moving {
         let timing = Timing { start_us: &start_us, reading_offset_us: &reading_offset_us };
         let readings = Frames { readings: &frames.inputs.values, timing: Some(timing) };
         decoder.decode_frames(readings, scans).values
+    }
+
+    /// Start of each scan of a trajectory in µs.
+    fn start_us(&self) -> impl Iterator<Item = u64> + Clone {
+        self.timetable.starts_s.iter().map(|start_s| (start_s * 1e6).round() as u64)
     }
 
     /// Newest finished estimates at all moments, of the `estimates` of all frames (`frames × outputs`): an estimate is

@@ -1,10 +1,11 @@
 //! The tracker of a scene: how its contacts move, and what they do to its readings.
 
-use taxel_core::track::{LATENTS, RATES, Settings, Sizes, Tracker};
+use taxel_core::track::{LATENTS, Settings, Sizes, Tracker};
 use taxel_data::BadValue;
 use taxel_learn::ModelBlob;
 use taxel_learn::tracked::Shares;
 use taxel_simulate::World;
+use taxel_simulate::motion::Dent;
 use taxel_simulate::path::Path;
 use taxel_simulate::sensor::{Sensor, Vector3};
 
@@ -53,9 +54,12 @@ pub fn add(blob: &ModelBlob, world: &World) -> Result<ModelBlob> {
 /// The tracker's floats.
 fn block(world: &World, sizes: Sizes) -> Result<Vec<f32>> {
     let sensor = &world.sensor;
-    let settings = settings(world)?;
-    let shear = f64::from(settings.range[4][1]);
-    let deformations = deformations(f64::from(settings.range[2][1]) / MOST_DEPTH, shear);
+    let Some(press) = world.motion.as_press() else {
+        let rule = "a tracker is of one contact, and the scene's deformation has none";
+        return Err(BadValue::new("training.track", true, rule).into());
+    };
+    let settings = settings(world, &press);
+    let deformations = deformations(press.dent_depth_mm[1], press.shear_ratio[1]);
     let shares = Shares::new(&deformations);
     let (mut rest_ohm, mut places, mut terms) = (vec![], vec![], vec![]);
     for row in &world.read_rows {
@@ -109,12 +113,8 @@ fn deformations(deepest_mm: f64, most_shear: f64) -> Vec<Vector3> {
 /// Most that a depth may be, over the deepest of the scene.
 const MOST_DEPTH: f64 = 1.2;
 
-/// How contacts of this world move.
-fn settings(world: &World) -> Result<Settings> {
-    let Some(press) = world.motion.as_press() else {
-        let rule = "a tracker is of one contact, and the scene's deformation has none";
-        return Err(BadValue::new("training.track", true, rule).into());
-    };
+/// How contacts of this world move, which are as wide, deep and sheared as `press`.
+fn settings(world: &World, press: &Dent) -> Settings {
     let ([[low, high], ..], [_, deepest], [_, shear]) =
         (press.quantities, press.dent_depth_mm, press.shear_ratio);
     let (slides, presses) = smooth(&world.sensor, world.path.as_ref(), deepest);
@@ -139,18 +139,17 @@ fn settings(world: &World) -> Result<Settings> {
     ];
     let noise = world.noise.total_level().max(1e-4);
     let narrow = |numbers: [f64; 3]| numbers.map(|number| number as f32);
-    Ok(Settings {
+    Settings {
         noise: noise as f32,
         smooth: [narrow(slides[0]), narrow(slides[1]), narrow(presses)],
         walks: walks.map(|walk| walk as f32),
         start: latents.map(|[deviation, usual, ..]| [deviation as f32, usual as f32]),
         range: latents.map(|[.., least, most]| [least as f32, most as f32]),
-    })
+    }
 }
 
 /// Rate, standard deviation and mean of x, y and depth.
 fn smooth(sensor: &Sensor, path: Option<&Path>, deepest: f64) -> ([[f64; 3]; 2], [f64; 3]) {
-    let _: [(); RATES] = [(); 3];
     let [x_mm, y_mm, _] = sensor.size_mm;
     let (slide, press) = path.map_or((USUAL_SLIDE_PER_S, USUAL_PRESS_PER_S), |path| {
         let middle = |[low, high]: [f64; 2]| 0.5 * (low + high);

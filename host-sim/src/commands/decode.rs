@@ -8,6 +8,7 @@ use crate::report::Sections;
 use crate::{Error, Result};
 use clap::Args;
 use taxel_core::filter::State;
+use taxel_core::track::Tracker;
 use taxel_data::Clock;
 use taxel_data::csv_file::{self, Column};
 use taxel_data::data_file::{DataFile, FieldTexts};
@@ -101,24 +102,20 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<print::Outcome>
     let (model, readings) =
         related(model, readings, baselines.as_ref(), &mut health.is_faulty, common);
     remark_on_range(&model, &readings, common);
-    let mut estimate = model.decode_table(&readings);
     let settings = arguments.filter.settings();
+    let tracker = parsed.tracker().filter(|_| !settings.is_on());
+    let mut estimate = match tracker.map(|tracker| (tracker, arguments.period.of_file(&file))) {
+        Some((tracker, Ok(start_us))) => tracked(&model, tracker, &readings, &start_us),
+        Some((_, Err(cause))) => {
+            common.remark(format_args!("note: no contact is tracked: {cause}"));
+            model.decode_table(&readings)
+        }
+        None => model.decode_table(&readings),
+    };
     if settings.is_on() {
         let start_us = arguments.period.of_file(&file)?;
         let mut state = State::new(vec![[0.0; 2]; estimate.names.len()]);
         filter_frames(&mut state, settings, &start_us, &mut estimate.values);
-    } else if let Some(tracker) = parsed.tracker() {
-        match arguments.period.of_file(&file) {
-            Ok(start_us) => {
-                let (relative, lead_us) = (metadata.relative_inputs, settings.lead_us as f32);
-                let tracked = Tracked::new(model.clone().of_inputs(), tracker, relative, lead_us);
-                let timing = Some(Timing { start_us: &start_us, reading_offset_us: &[] });
-                let inputs = model.model_inputs(&readings.values);
-                let frames = Frames { readings: &inputs, timing };
-                estimate.values = tracked.decode_frames(frames, start_us.len()).values.into();
-            }
-            Err(cause) => common.remark(format_args!("note: no contact is tracked: {cause}")),
-        }
     }
     let keep = kept(arguments, &file, &estimate)?;
     let assessed = arguments.confidence.then(|| model.assess(&readings.values));
@@ -163,6 +160,22 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<print::Outcome>
     result.fact("frames_novel", "novel frames, unlike those of training", "", novel);
     result.fact("file", "file", "", arguments.to.output.display().to_string());
     Ok(print::sections(common, &result))
+}
+
+/// Estimates behind the model's `tracker`, of lines that begin at these times.
+fn tracked(
+    model: &PreparedModel<'_>,
+    tracker: Tracker<'_>,
+    readings: &Table,
+    start_us: &[u64],
+) -> Table {
+    let metadata = model.model().metadata();
+    let tracked = Tracked::new(model.clone().of_inputs(), tracker, metadata.relative_inputs, 0.0);
+    let timing = Some(Timing { start_us, reading_offset_us: &[] });
+    let inputs = model.model_inputs(&readings.values);
+    let estimates = tracked.decode_frames(Frames { readings: &inputs, timing }, start_us.len());
+    let names = metadata.output_names.iter().map(String::from).collect();
+    Table { names, values: estimates.values.into() }
 }
 
 /// Column of novelty, and what follows an output's name in the name of its deviation.

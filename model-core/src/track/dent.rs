@@ -4,7 +4,7 @@
 //! radius s for a = 1, b = 0 and p = 1; an ellipse for other a and b; flatter for a larger exponent p, with a longer tail for a
 //! smaller one. Latents are ln a/2, b and ln p.
 
-use super::walk::{LATENTS, Latents};
+use super::walk::Latents;
 use crate::exp::exp;
 
 /// Latents that the depth of a place depends on, by their places in [`Latents`]: all but the shear.
@@ -32,7 +32,6 @@ pub struct Depth {
 
 impl Dent {
     pub fn new([x, y, depth_mm, radius_mm, _, _, stretch, turn, form]: Latents) -> Self {
-        let _: [(); LATENTS] = [(); 9];
         Self {
             centre_mm: [x, y],
             depth_mm,

@@ -139,23 +139,23 @@ fn of_pass(found: &Diagnosis) -> Vec<Stage> {
     } else {
         "timer 8 triggers too seldom, or a converter stops: numbers are missing"
     };
-    let parts = [
-        ("rows by DMA", "DMA2 stream 6 stalls: it does not drive the rows (timer 1, channel 3)"),
-        (
-            "switches by DMA",
-            "DMA2 stream 2 stalls: it does not switch the multiplexers (timer 1, channel 2)",
-        ),
-        ("numbers by DMA", of_numbers),
-        (
-            "end by DMA",
-            "DMA2 stream 5 stalls: it does not let the rows idle behind the last one (timer 1, update)",
-        ),
+    let causes = [
+        "DMA2 stream 6 stalls: it does not drive the rows (timer 1, channel 3)",
+        "DMA2 stream 2 stalls: it does not switch the multiplexers (timer 1, channel 2)",
+        of_numbers,
+        "DMA2 stream 5 stalls: it does not let the rows idle behind the last one (timer 1, update)",
     ];
-    let moved = found.items.iter().zip(found.items_left).zip(parts);
+    let moved = found.items.iter().zip(found.items_left);
     let mut stages: Vec<Stage> = moved
-        .map(|((items, left), (name, cause))| {
+        .zip(Diagnosis::PARTS.into_iter().zip(causes))
+        .map(|((items, left), (part, cause))| {
             let cause = (left != 0).then_some(cause);
-            Stage::new(name, items.saturating_sub(left), items.to_string(), cause)
+            Stage::new(
+                format!("{part} by DMA"),
+                items.saturating_sub(left),
+                items.to_string(),
+                cause,
+            )
         })
         .collect();
     let deaf = "timer 1 does not stop behind the last row: it does not count, or repeats";
