@@ -26,9 +26,8 @@ use crate::estimate::{Estimate, RowStatus};
 use crate::rbf::NetworkError;
 use dent::Dent;
 use linear::{Matrix, Vector, ZERO, cholesky, dot, solve_lower, transpose};
-use readings::Frame;
 
-pub use readings::{Sizes, TERMS};
+pub use readings::{Frame, Sizes, TERMS};
 pub use walk::{LATENTS, Latents, RATES, Settings};
 
 /// Numbers of the state: latents, and the rates of the first three.
@@ -81,7 +80,16 @@ pub struct State {
     other: Contact,
     /// Whether there is a contact now.
     is_known: bool,
+    /// How far a frame is explained that is not finished.
+    followed: Option<Followed>,
     work: [Matrix; 3],
+}
+
+/// What a frame has shown of the contact before it: the time since, and the mean square of residuals over that of the noise.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Followed {
+    gap_s: f32,
+    residual: f32,
 }
 
 /// A contact as it is known, and when.
@@ -107,24 +115,13 @@ impl State {
     pub const fn new() -> Self {
         const NOTHING: Contact =
             Contact { mean: [0.0; NUMBERS], root: ZERO, at_us: 0, level: 1.0, frames: 0 };
-        Self { now: NOTHING, other: NOTHING, is_known: false, work: [ZERO; 3] }
+        Self { now: NOTHING, other: NOTHING, is_known: false, followed: None, work: [ZERO; 3] }
     }
 
     /// Lets the next frame be the first one.
     pub fn restart(&mut self) {
         self.is_known = false;
     }
-}
-
-/// When a frame was read, and how far ahead its estimate is to be.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Times<'t> {
-    /// Start of the frame in µs, by a clock of any start.
-    pub start_us: u64,
-    /// Time in µs from there to the middle of each row's readings.
-    pub row_us: &'t [f32],
-    /// Time in µs from the start for which outputs are expected.
-    pub ahead_us: f32,
 }
 
 impl<'a> Tracker<'a> {
@@ -171,56 +168,74 @@ impl<'a> Tracker<'a> {
         self.sizes
     }
 
-    /// Corrects the `state` by a frame, and writes outputs over the `estimate` that a network has made of it: unless the
-    /// tracker cannot explain the frame. Returns whether it did.
-    ///
-    /// `readings_ohm` are all cells, row after row; one that is NaN does not count. `reciprocals` are one over each reading of
-    /// the baseline, in place of the resistances at rest that the blob has.
-    pub fn track(
+    /// Corrects the `state` by the next frame, and writes outputs to the `estimate` if the state explains the frame. Returns
+    /// whether it does: else a network must decode the frame, for [`start`](Self::start).
+    #[inline(never)] // so that others' work finds the stack free
+    pub fn follow(
         &self,
         state: &mut State,
-        readings_ohm: &[f32],
-        reciprocals: Option<&[f32]>,
-        times: Times<'_>,
+        frame: &Frame<'_>,
         estimate: &mut Estimate<'_>,
     ) -> bool {
         let settings = &self.settings();
-        let middle_us = times.row_us.iter().sum::<f32>() / times.row_us.len().max(1) as f32;
-        let at_us = times.start_us.saturating_add(middle_us as u64);
-        let frame = Frame { readings_ohm, reciprocals, row_us: times.row_us, middle_us };
-        let State { now, other, is_known, work } = state;
-        let gap_s = Some(&*now).filter(|_| *is_known).and_then(|now| now.gap_s(at_us));
-        *is_known = false;
-        let (level, frames) = gap_s.map_or((1.0, 0), |_| (now.level, now.frames));
-        // Squares of normal numbers, each of variance 2.
-        let deviation = libm::sqrtf(2.0 / self.sizes.cells() as f32);
-        let is_explained = |residual: f32| residual < (1.0 + NOT_EXPLAINED * deviation) * level;
-        let mut residual = f32::INFINITY;
-        if let Some(gap_s) = gap_s {
-            settings.predict(now, gap_s, work);
-            now.at_us = at_us;
-            residual = self.correct(settings, now, &frame, ITERATIONS, work);
+        let State { now, is_known, followed, work, .. } = state;
+        let at_us = frame.middle().1;
+        *followed = None;
+        let Some(gap_s) = now.gap_s(at_us).filter(|_| *is_known) else { return false };
+        settings.predict(now, gap_s, work);
+        now.at_us = at_us;
+        let residual = self.correct(settings, now, frame, ITERATIONS, work);
+        *followed = Some(Followed { gap_s, residual });
+        self.is_explained(residual, now.level) && self.finish(settings, state, frame, estimate)
+    }
+
+    /// Starts a contact from a network's `estimate` of a frame that [`follow`](Self::follow) did not explain, and writes
+    /// outputs over it if that does, or explains the frame better than the contact before. Returns whether it wrote them.
+    #[inline(never)]
+    pub fn start(&self, state: &mut State, frame: &Frame<'_>, estimate: &mut Estimate<'_>) -> bool {
+        let settings = &self.settings();
+        let State { now, other, followed, work, .. } = state;
+        let (level, frames) = followed.map_or((1.0, 0), |_| (now.level, now.frames));
+        self.begin(settings, estimate, other);
+        (other.at_us, other.level, other.frames) = (frame.middle().1, level, frames);
+        let residual = self.correct(settings, other, frame, FIRST_ITERATIONS, work);
+        let before = followed.get_or_insert(Followed { gap_s: 0.0, residual: f32::NAN });
+        if residual < before.residual || before.residual.is_nan() {
+            mem::swap(now, other);
+            before.residual = residual;
         }
-        if !is_explained(residual) {
-            self.start(settings, estimate, other);
-            (other.at_us, other.level) = (at_us, level);
-            let anew = self.correct(settings, other, &frame, FIRST_ITERATIONS, work);
-            if anew < residual || residual.is_nan() {
-                mem::swap(now, other);
-                residual = anew;
-            }
-        }
-        if !residual.is_finite() || !now.mean.iter().all(|number| number.is_finite()) {
+        self.finish(settings, state, frame, estimate)
+    }
+
+    /// Learns the level of residuals from a frame, and writes its outputs if it is explained. Returns whether it is.
+    fn finish(
+        &self,
+        settings: &Settings,
+        state: &mut State,
+        frame: &Frame<'_>,
+        estimate: &mut Estimate<'_>,
+    ) -> bool {
+        let State { now, is_known, followed, .. } = state;
+        let Some(Followed { gap_s, residual }) = followed.take() else { return false };
+        *is_known = residual.is_finite() && now.mean.iter().all(|number| number.is_finite());
+        if !*is_known {
             return false;
         }
-        let learnt = learnt_level(level, residual, gap_s.unwrap_or(0.0), frames);
-        (now.level, now.frames) = (learnt.clamp(LEVELS[0], LEVELS[1]), frames.saturating_add(1));
-        *is_known = true;
-        if is_explained(residual) {
-            let ahead_s = (times.ahead_us - middle_us) * 1e-6;
+        let is_explained = self.is_explained(residual, now.level);
+        let learnt = learnt_level(now.level, residual, gap_s, now.frames);
+        (now.level, now.frames) =
+            (learnt.clamp(LEVELS[0], LEVELS[1]), now.frames.saturating_add(1));
+        if is_explained {
+            let ahead_s = (frame.ahead_us - frame.middle().0) * 1e-6;
             self.write(&settings.mean_after(&now.mean, ahead_s), estimate);
         }
-        is_explained(residual)
+        is_explained
+    }
+
+    /// Whether a mean square of `residual`s is one of this level: squares of normal numbers, each of variance 2.
+    fn is_explained(&self, residual: f32, level: f32) -> bool {
+        let deviation = libm::sqrtf(2.0 / self.sizes.cells() as f32);
+        residual < (1.0 + NOT_EXPLAINED * deviation) * level
     }
 
     /// Corrects a state by a frame of its time. Returns the mean square of residuals before the last correction, over that of
@@ -273,7 +288,7 @@ impl<'a> Tracker<'a> {
     }
 
     /// Makes the `contact` one as the network sees it.
-    fn start(&self, settings: &Settings, estimate: &Estimate<'_>, contact: &mut Contact) {
+    fn begin(&self, settings: &Settings, estimate: &Estimate<'_>, contact: &mut Contact) {
         let Contact { mean, root, .. } = contact;
         (*mean, *root) = ([0.0; NUMBERS], ZERO);
         for (place, [deviation, usual]) in walk::PLACES.into_iter().zip(settings.start) {

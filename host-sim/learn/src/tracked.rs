@@ -1,7 +1,7 @@
 //! Decoders that track a contact, bit for bit as a device does, and the shares that a tracker needs of a sensor.
 
 use nalgebra::{DMatrix, DVector};
-use taxel_core::track::{State, TERMS, Times, Tracker};
+use taxel_core::track::{Frame, State, TERMS, Tracker};
 use taxel_core::{Estimate, RowStatus};
 
 use crate::decoder::{Estimates, FrameDecoder, Frames, Timing};
@@ -58,8 +58,16 @@ impl<D: FrameDecoder> FrameDecoder for Tracked<'_, D> {
             let mut outputs: Vec<f32> = values.iter().map(|value| *value as f32).collect();
             let mut status = vec![RowStatus::Decoded; sizes.rows];
             let mut estimate = Estimate { outputs: &mut outputs, status: &mut status };
-            let times = Times { start_us: *start_us, row_us: &row_us, ahead_us: self.ahead_us };
-            self.tracker.track(state, &readings, reciprocals, times, &mut estimate);
+            let frame = Frame {
+                readings_ohm: &readings,
+                reciprocals,
+                start_us: *start_us,
+                row_us: &row_us,
+                ahead_us: self.ahead_us,
+            };
+            if !self.tracker.follow(state, &frame, &mut estimate) {
+                self.tracker.start(state, &frame, &mut estimate);
+            }
             values.iter_mut().zip(outputs).for_each(|(value, output)| *value = f64::from(output));
         }
         estimates

@@ -56,14 +56,27 @@ impl Sizes {
     }
 }
 
-/// Readings of a frame, and when rows were read.
+/// A frame of readings, when rows were read, and how far ahead its estimate is to be.
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Frame<'f> {
+    /// All cells in Ω, row after row; one that is NaN does not count.
     pub readings_ohm: &'f [f32],
-    /// One over each resistance at rest, if it is known better than from the blob.
+    /// One over each reading of the baseline, in place of the resistances at rest that the blob has.
     pub reciprocals: Option<&'f [f32]>,
+    /// Start of the frame in µs, by a clock of any start.
+    pub start_us: u64,
+    /// Time in µs from there to the middle of each row's readings.
     pub row_us: &'f [f32],
-    /// The time in µs that the state is of.
-    pub middle_us: f32,
+    /// Time in µs from the start for which outputs are expected.
+    pub ahead_us: f32,
+}
+
+impl Frame<'_> {
+    /// Middle of the times of rows, in µs from the start and by the clock: the time that a state is of.
+    pub(super) fn middle(&self) -> (f32, u64) {
+        let middle_us = self.row_us.iter().sum::<f32>() / self.row_us.len().max(1) as f32;
+        (middle_us, self.start_us.saturating_add(middle_us as u64))
+    }
 }
 
 /// What a row says of latents: the lower half of JᵀJ, Jᵀr, the sum of r² and the number of readings.
@@ -95,9 +108,10 @@ impl Tracker<'_> {
         gradient: &mut Vector,
     ) -> f32 {
         *information = ZERO;
+        let middle_us = frame.middle().0;
         let (mut squares, mut readings) = (0.0, 0);
         for (row, row_us) in frame.row_us.iter().enumerate().take(self.sizes.rows) {
-            let since_s = (row_us - frame.middle_us) * 1e-6;
+            let since_s = (row_us - middle_us) * 1e-6;
             let mut latents = PLACES.map(|place| mean[place]);
             for (axis, latent) in latents.iter_mut().take(RATES).enumerate() {
                 *latent += since_s * mean[2 * axis + 1];

@@ -50,6 +50,16 @@ fn tracker(block: &[f32]) -> Tracker<'_> {
     Tracker::new(SIZES, block).unwrap()
 }
 
+/// Takes a frame of which the network's estimate is given.
+fn take(
+    tracker: &Tracker<'_>,
+    state: &mut State,
+    frame: &Frame<'_>,
+    estimate: &mut Estimate<'_>,
+) -> bool {
+    tracker.follow(state, frame, estimate) || tracker.start(state, frame, estimate)
+}
+
 /// A contact that slides, is pressed and sheared, at a time.
 fn contact(time_s: f32) -> Latents {
     let depth = 0.4 + 0.3 * (12.0 * time_s).sin();
@@ -102,8 +112,15 @@ fn track(frames: u32, change: impl Fn(u32, &mut [f32])) -> (f32, u32) {
             tracker.places_mm.iter().map(|place| before.at(*place).mm + 0.05).collect();
         let mut status = [RowStatus::Decoded; 4];
         let mut estimate = Estimate { outputs: &mut outputs, status: &mut status };
-        let times = Times { start_us: 2000 * u64::from(frame), row_us: &row_us, ahead_us: 3000.0 };
-        let is_explained = tracker.track(&mut state, &ohm, None, times, &mut estimate);
+        let start_us = 2000 * u64::from(frame);
+        let frame_read = Frame {
+            readings_ohm: &ohm,
+            reciprocals: None,
+            start_us,
+            row_us: &row_us,
+            ahead_us: 3000.0,
+        };
+        let is_explained = take(&tracker, &mut state, &frame_read, &mut estimate);
         explained += u32::from(is_explained);
         if frame >= frames / 2 && is_explained {
             let errors = tracker.places_mm.iter().zip(&outputs);
@@ -150,8 +167,9 @@ fn gaps_and_times_that_go_back_start_anew() {
     let at = |state: &mut State, start_us| {
         let (mut outputs, mut status) = ([0.1; 16], [RowStatus::Decoded; 4]);
         let mut estimate = Estimate { outputs: &mut outputs, status: &mut status };
-        let times = Times { start_us, row_us: &[0.0; 4], ahead_us: 0.0 };
-        tracker.track(state, &ohm, None, times, &mut estimate);
+        let (row_us, reciprocals) = (&[0.0; 4], None);
+        let frame = Frame { readings_ohm: &ohm, reciprocals, start_us, row_us, ahead_us: 0.0 };
+        take(&tracker, state, &frame, &mut estimate);
         (state.is_known, state.now.mean)
     };
     let first = at(&mut State::new(), 0);
@@ -183,7 +201,13 @@ fn slopes_are_those_of_depths_and_readings() {
     // A state that is off is told the way: the gradient is that of the squares.
     let ohm = readings(&tracker, |_| latents);
     let row_us = [0.0; 4];
-    let frame = Frame { readings_ohm: &ohm, reciprocals: None, row_us: &row_us, middle_us: 0.0 };
+    let frame = Frame {
+        readings_ohm: &ohm,
+        reciprocals: None,
+        start_us: 0,
+        row_us: &row_us,
+        ahead_us: 0.0,
+    };
     let mut mean = [0.0; NUMBERS];
     for (place, latent) in walk::PLACES.into_iter().zip(latents) {
         mean[place] = latent + 0.01;
@@ -248,10 +272,15 @@ fn floats_that_no_tracker_has_are_refused_and_no_number_makes_it_panic() {
             for frame in 0..2 {
                 let (mut outputs, mut status) = ([number; 48], [RowStatus::Decoded; 4]);
                 let mut estimate = Estimate { outputs: &mut outputs, status: &mut status };
-                let times =
-                    Times { start_us: 1000 * frame, row_us: &[number; 3], ahead_us: number };
                 let ohm = [number, 50.0, -number, f32::NAN, f32::INFINITY];
-                tracker.track(&mut state, &ohm, Some(&ohm), times, &mut estimate);
+                let frame = Frame {
+                    readings_ohm: &ohm,
+                    reciprocals: Some(&ohm),
+                    start_us: 1000 * frame,
+                    row_us: &[number; 3],
+                    ahead_us: number,
+                };
+                take(&tracker, &mut state, &frame, &mut estimate);
             }
         }
     }
