@@ -1,4 +1,4 @@
-//! The application: scan → health → decode → filter → report, and the link, in one loop without waits.
+//! The application: scan → health → track or decode → filter → report, and the link, in one loop without waits.
 //!
 //! A board's program makes an [`App`] of its parts and calls [`App::run`], which returns only when the program
 //! must restart. All large memory is in [`Buffers`], for which the program has a static: nothing grows, nothing
@@ -64,12 +64,14 @@ impl<'m, P: Platform, F: FrameSource, const ROWS: usize> App<'m, P, F, ROWS> {
             received,
             message,
             frame,
+            measured,
             places,
             baseline,
             reciprocals,
             scratch,
             estimate,
             tracks,
+            contact,
             deviations,
         } = buffers;
         let capacity = Buffers::<ROWS, COLUMNS, OUTPUTS, BYTES>::CAPACITY;
@@ -88,9 +90,11 @@ impl<'m, P: Platform, F: FrameSource, const ROWS: usize> App<'m, P, F, ROWS> {
             outputs: 0,
             reciprocals: reciprocals.as_flattened_mut(),
             has_reciprocals: false,
+            measured: measured.as_flattened_mut(),
             scratch: scratch.as_flattened_mut().as_flattened_mut(),
             estimate: estimate.whole(),
             filter: State::new(tracks.as_flattened_mut()),
+            contact,
             deviations: deviations.as_flattened_mut(),
         };
         let core = Core { sensor, models: Models::new(capacity), link, work };

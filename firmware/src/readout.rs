@@ -92,9 +92,20 @@ pub const LONGEST_SCAN_US: u64 = 2_000_000;
 /// Number of scans between two in which columns are sampled idle.
 pub const SCANS_A_ROUND: u8 = 16;
 
+/// When the rows of a scan are read.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct RowTimes {
+    /// Time in µs from the scan's start to the middle of the first row's readings.
+    pub first_us: f32,
+    /// Time in µs from one row to the next.
+    pub step_us: f32,
+}
+
 /// Report on a scan.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct ScanReport {
+    /// When rows were read; zeros of a source that does not know.
+    pub row_times: RowTimes,
     /// Number of samples that could not be taken, those of idle rows included. A failed release of the rows
     /// counts as one.
     pub failed_samples: u16,
@@ -104,7 +115,8 @@ impl ScanReport {
     /// Makes every reading of `frame` a failed one.
     pub(crate) fn of_failed(frame: &mut [f32]) -> Self {
         frame.fill(f32::NAN);
-        Self { failed_samples: u16::try_from(frame.len()).unwrap_or(u16::MAX) }
+        let failed_samples = u16::try_from(frame.len()).unwrap_or(u16::MAX);
+        Self { failed_samples, ..Self::default() }
     }
 }
 

@@ -4,7 +4,7 @@
 
 use crate::capacity::Capacity;
 use crate::link::message::Configuration;
-use crate::readout::SCANS_A_ROUND;
+use crate::readout::{RowTimes, SCANS_A_ROUND};
 
 /// Clock in Hz of a bus of MCP3208 converters on a processor like the NUCLEO-F446RE's: 45 MHz/64. They take at most 1 MHz at
 /// 3.3 V, and the divider has powers of two.
@@ -225,6 +225,22 @@ impl ScanPlan {
     /// Number of passes over the rows.
     pub fn passes(&self) -> u16 {
         self.oversampling.div_ceil(self.pass_samples.max(1)).max(1)
+    }
+
+    /// When rows are read, in the mean over all passes.
+    ///
+    /// ```
+    /// use taxel_firmware::timing::ScanPlan;
+    /// let times = ScanPlan::of_nucleo_onchip(8, 18, 12).row_times();
+    /// assert_eq!((times.first_us.round(), times.step_us.round()), (67.0, 113.0)); // the first 20 µs of 113 are a wait
+    /// ```
+    pub fn row_times(&self) -> RowTimes {
+        let passes = f32::from(self.passes());
+        let step_us = self.step_ns(self.columns) as f32 / (1000.0 * passes);
+        let between_us = self.between_passes_ns as f32 / 1000.0;
+        let pass_us = f32::from(self.rows) * step_us + between_us;
+        let first_us = 0.5 * (step_us + self.settling_us as f32 + (passes - 1.0) * pass_us);
+        RowTimes { first_us, step_us }
     }
 
     fn of_rows_ns(&self) -> u64 {

@@ -7,4 +7,5 @@ mod configuration;
 mod decoding;
 mod filter;
 mod model;
+mod track;
 mod turns;

@@ -113,8 +113,9 @@ impl Default for State {
 impl State {
     /// Before the first frame.
     pub const fn new() -> Self {
+        // All zero, so that a static of it costs no flash.
         const NOTHING: Contact =
-            Contact { mean: [0.0; NUMBERS], root: ZERO, at_us: 0, level: 1.0, frames: 0 };
+            Contact { mean: [0.0; NUMBERS], root: ZERO, at_us: 0, level: 0.0, frames: 0 };
         Self { now: NOTHING, other: NOTHING, is_known: false, followed: None, work: [ZERO; 3] }
     }
 

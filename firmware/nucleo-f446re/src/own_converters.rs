@@ -21,9 +21,11 @@ use stm32f4xx_hal::pac::dma2::ST;
 use stm32f4xx_hal::pac::{ADC_COMMON, ADC1, ADC2, ADC3, DMA2, GPIOB, RCC, TIM1, TIM8};
 use stm32f4xx_hal::rcc::Rcc;
 use taxel_core::RowWire;
-use taxel_firmware::readout::{Diagnosis, Sequencer, SequencerFault, add_samples};
+use taxel_firmware::readout::{
+    Diagnosis, RowTimes, ScanSettings, Sequencer, SequencerFault, add_samples,
+};
 use taxel_firmware::timing::{
-    ONCHIP_COLUMNS, ONCHIP_ROWS, ONCHIP_SAMPLES, ONCHIP_TRIGGER_TICKS, RowCounts,
+    ONCHIP_COLUMNS, ONCHIP_ROWS, ONCHIP_SAMPLES, ONCHIP_TRIGGER_TICKS, RowCounts, ScanPlan,
 };
 
 use crate::dma::{self, COUNT_UP, FROM_MEMORY};
@@ -250,6 +252,11 @@ impl Sequencer<COLUMNS> for OwnConverters {
         let numbers = unsafe { &(*numbers).numbers };
         add_samples(numbers.get(..count).unwrap_or_default(), self.samples, sums);
         Some(Ok(()))
+    }
+
+    fn line_times(&self, lines: usize, settings: ScanSettings) -> RowTimes {
+        let plan = ScanPlan::of_nucleo_onchip(lines as u16, ONCHIP_COLUMNS, settings.oversampling);
+        ScanPlan { settling_us: settings.settling_us, ..plan }.row_times()
     }
 
     fn diagnose(&mut self) -> Option<Diagnosis> {

@@ -34,7 +34,7 @@ struct NoSensor(ZeroPotential<{ CAPACITY.rows }, { CAPACITY.columns }>);
 impl WaitingSource for NoSensor {
     fn scan(&mut self, _: ScanSettings, _: Selection<'_>, frame: &mut [f32]) -> ScanReport {
         frame.fill(f32::NAN);
-        ScanReport { failed_samples: frame.len() as u16 }
+        ScanReport { failed_samples: frame.len() as u16, ..ScanReport::default() }
     }
 }
 

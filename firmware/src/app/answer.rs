@@ -6,6 +6,7 @@ use super::Core;
 use super::link::Link;
 use super::model::InForce;
 use super::models::Models;
+use super::sensor::Scan;
 use super::session::Session;
 use super::session_end::SessionEnd;
 use crate::circuit::ConstantsFault;
@@ -14,7 +15,7 @@ use crate::link::packet::{self, PROTOCOL_VERSION, PacketError};
 use crate::link::receive::Received;
 use crate::log::info;
 use crate::platform::Platform;
-use crate::readout::FrameSource;
+use crate::readout::{FrameSource, RowTimes};
 use crate::store::Slot;
 
 impl<P: Platform, F: FrameSource, S: Slot, const ROWS: usize> Session<'_, '_, P, F, S, ROWS> {
@@ -64,10 +65,11 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
                 sensor.set_frame(readings_ohm).map(|()| {
                     let decoder = model.decoder.as_ref();
                     let sent = ConfidenceSent::Deviations;
-                    // A filter of scans is left alone: anybody may ask for a decoding.
-                    let filtered_us =
-                        (sensor.configuration.frame_period_us == 0).then_some(start_us);
-                    let (mut flags, _) = work.decode(sensor, filtered_us, link, decoder);
+                    // Filter and tracker of scans are left alone: anybody may ask for a decoding.
+                    let series = sensor.configuration.frame_period_us == 0;
+                    let scan = Scan { start_us, missed: 0, row_times: RowTimes::default() };
+                    let scan = series.then_some(scan);
+                    let (mut flags, _) = work.decode(sensor, scan, link, model);
                     let novelty = work.assess(sensor.frame(), link, decoder, sent, &mut flags);
                     work.send_estimate(number, (frame, start_us), flags, (novelty, sent), link);
                     None

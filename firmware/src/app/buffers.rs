@@ -1,6 +1,7 @@
 //! The large part of an application's memory.
 
 use taxel_core::filter::Track;
+use taxel_core::track;
 use taxel_core::{Estimate, RowStatus};
 
 /// The buffers of an application with room for `ROWS` rows of `COLUMNS` readings and `OUTPUTS` outputs. They are all
@@ -16,6 +17,8 @@ pub struct Buffers<
     pub(super) received: [u8; BYTES],
     pub(super) message: [u8; BYTES],
     pub(super) frame: [[f32; COLUMNS]; ROWS],
+    /// The readings of a frame before any is filled.
+    pub(super) measured: [[f32; COLUMNS]; ROWS],
     /// Place of each reading of the model in a scan.
     pub(super) places: [[u16; COLUMNS]; ROWS],
     pub(super) baseline: [[f32; COLUMNS]; ROWS],
@@ -26,6 +29,8 @@ pub struct Buffers<
     pub(super) estimate: Outcome<ROWS, OUTPUTS>,
     /// State of the filter in time.
     pub(super) tracks: [[Track; OUTPUTS]; ROWS],
+    /// State of the tracker of a contact.
+    pub(super) contact: track::State,
     /// Standard deviations of the outputs.
     pub(super) deviations: [[f32; OUTPUTS]; ROWS],
 }
@@ -68,12 +73,14 @@ impl<const ROWS: usize, const COLUMNS: usize, const OUTPUTS: usize, const BYTES:
             received: [0; BYTES],
             message: [0; BYTES],
             frame: [[0.0; COLUMNS]; ROWS],
+            measured: [[0.0; COLUMNS]; ROWS],
             places: [[0; COLUMNS]; ROWS],
             baseline: [[0.0; COLUMNS]; ROWS],
             reciprocals: [[0.0; COLUMNS]; ROWS],
             scratch: [[[0.0; COLUMNS]; ROWS]; 2],
             estimate: Outcome::NOTHING,
             tracks: [[[0.0; 2]; OUTPUTS]; _],
+            contact: track::State::new(),
             deviations: [[0.0; OUTPUTS]; _],
         }
     }

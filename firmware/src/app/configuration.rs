@@ -13,7 +13,7 @@ impl Configuration {
     pub const FRAME_PERIOD_US: RangeInclusive<u32> = 100..=1_000_000_000;
 
     /// The default configuration: 100 frames a second, estimates are sent without confidence, limits for rubber of about
-    /// 60 Ω, and nothing is filtered.
+    /// 60 Ω, nothing is filtered, and models with a tracker track.
     pub const DEFAULT: Self = Self {
         frame_period_us: 10_000,
         scan: ScanSettings { settling_us: 20, oversampling: 1 },
@@ -26,6 +26,7 @@ impl Configuration {
         filter_time_constant_us: 0,
         filter_lead_us: 0,
         report_every: 1,
+        track: true,
     };
 
     /// Settings of the filter in time.

@@ -2,6 +2,7 @@
 
 use taxel_core::blob::{Columns, DecodeError, Model};
 use taxel_core::checksum::CRC_32;
+use taxel_core::track::Tracker;
 use taxel_core::{Decoder, scratch_floats};
 
 use crate::capacity::Capacity;
@@ -11,6 +12,7 @@ use crate::store::{ConfirmedModels, Slot, blob_in_slot};
 /// The model in force, if there is one.
 pub struct InForce<'a, const ROWS: usize> {
     pub decoder: Option<Decoder<'a, ROWS>>,
+    pub tracker: Option<Tracker<'a>>,
     pub identity: Option<ModelIdentity>,
     /// Its blob, which the decoder borrows.
     pub blob: &'a [u8],
@@ -19,7 +21,8 @@ pub struct InForce<'a, const ROWS: usize> {
 }
 
 impl<'a, const ROWS: usize> InForce<'a, ROWS> {
-    pub const NONE: Self = Self { decoder: None, identity: None, blob: &[], stored: None };
+    pub const NONE: Self =
+        Self { decoder: None, tracker: None, identity: None, blob: &[], stored: None };
 
     /// Puts the model in `bytes` in force, which start with its blob; `None` if it is not sound, or there is no room
     /// for it.
@@ -34,6 +37,7 @@ impl<'a, const ROWS: usize> InForce<'a, ROWS> {
         let blob = blob_in_slot(bytes);
         let model = check(capacity, blob).ok()?;
         let decoder = self.decoder.insert(Decoder::new(model).ok()?);
+        self.tracker = decoder.model().tracker();
         let (shape, metadata) = (decoder.shape(), decoder.metadata());
         let identity = ModelIdentity {
             crc_32: decoder.model_crc(),

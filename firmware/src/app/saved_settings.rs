@@ -17,7 +17,7 @@ use crate::store::Kind;
 /// Version of what is kept for `setting`. Whoever changes the setting's fields must raise it.
 const fn version(setting: Setting) -> u8 {
     match setting {
-        Setting::Configuration => 4,
+        Setting::Configuration => 5,
         Setting::Baseline => 3,
         Setting::Constants => 2,
     }

@@ -14,7 +14,7 @@ use crate::link::packet::UNASKED;
 use crate::log::info;
 use crate::platform::Platform;
 use crate::readout::{
-    Baseline, Diagnosis, FrameSource, LONGEST_SCAN_US, ScanReport, Scanning, Selection,
+    Baseline, Diagnosis, FrameSource, LONGEST_SCAN_US, RowTimes, ScanReport, Scanning, Selection,
 };
 
 /// The sensor and the settings that belong to it.
@@ -49,6 +49,8 @@ pub struct Scan {
     pub start_us: u64,
     /// Number of frames that were missed before it.
     pub missed: u32,
+    /// When its rows were read.
+    pub row_times: RowTimes,
 }
 
 /// A scan whose frame is still to be read.
@@ -174,7 +176,7 @@ impl<F: FrameSource, const ROWS: usize> Sensor<'_, F, ROWS> {
         {
             let missed_frames = &mut link.statistics.frames_missed;
             *missed_frames = missed_frames.saturating_add(missed);
-            let scan = Scan { start_us: link.now_us(), missed };
+            let scan = Scan { start_us: link.now_us(), missed, row_times: RowTimes::default() };
             match self.source.scanning() {
                 Scanning::Runs(source) => {
                     source.start(self.configuration.scan, self.wiring.selection());
@@ -183,7 +185,7 @@ impl<F: FrameSource, const ROWS: usize> Sensor<'_, F, ROWS> {
                 Scanning::Waits(_) => ended = Some(Ended { scan, end_us: None, is_whole: true }),
             }
         }
-        let Ended { scan, end_us, is_whole } = ended?;
+        let Ended { mut scan, end_us, is_whole } = ended?;
         let settings = self.configuration.scan;
         let frame = self.frame.get_mut(..self.wiring.readings).unwrap_or_default();
         let read = |wires: Selection<'_>, frame: &mut [f32]| match self.source.scanning() {
@@ -194,10 +196,17 @@ impl<F: FrameSource, const ROWS: usize> Sensor<'_, F, ROWS> {
         let report = self.wiring.fill(frame, scratch, read);
         let end_us = end_us.unwrap_or_else(|| link.now_us());
         self.answers = self.frame().iter().any(|reading| !reading.is_nan());
+        let scan_us = end_us.wrapping_sub(scan.start_us) as u32;
+        scan.row_times = report.row_times;
+        if scan.row_times == RowTimes::default() {
+            // One after the other, as far as anybody knows.
+            let step_us = scan_us as f32 / self.wiring.selection().rows.len().max(1) as f32;
+            scan.row_times = RowTimes { first_us: 0.5 * step_us, step_us };
+        }
         let s = &mut link.statistics;
         let frame = s.number_frame();
         s.failed_samples = s.failed_samples.saturating_add(u32::from(report.failed_samples));
-        s.longest_scan_us = s.longest_scan_us.max(end_us.wrapping_sub(scan.start_us) as u32);
+        s.longest_scan_us = s.longest_scan_us.max(scan_us);
         if self.configuration.send_readings {
             let (start_us, readings_ohm) = (scan.start_us, Floats::new(self.frame()));
             link.send(UNASKED, &Report::Readings { frame, start_us, readings_ohm });

@@ -80,7 +80,7 @@ impl<'a, 'm, P: Platform, F: FrameSource, S: Slot, const ROWS: usize>
             let Core { models, link, .. } = &mut self.app.core;
             models.end_late_trial(link)
         });
-        self.app.core.scan_if_due(self.model.decoder.as_ref());
+        self.app.core.scan_if_due(&self.model);
         self.app.core.feed_watchdog();
         end
     }
@@ -103,14 +103,12 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
     }
 
     /// Scans frames, decodes the one that is complete and reports on it.
-    fn scan_if_due(&mut self, decoder: Option<&Decoder<'_, ROWS>>) {
+    fn scan_if_due(&mut self, model: &InForce<'_, ROWS>) {
         let Self { sensor, link, work, .. } = self;
-        let Some((frame, Scan { start_us, missed })) = sensor.scan_if_due(work.scratch, link)
-        else {
-            return;
-        };
-        let (mut flags, health) = work.decode(sensor, Some(start_us), link, decoder);
-        let sent = sensor.configuration.confidence;
+        let Some((frame, scan)) = sensor.scan_if_due(work.scratch, link) else { return };
+        let Scan { start_us, missed, .. } = scan;
+        let (mut flags, health) = work.decode(sensor, Some(scan), link, model);
+        let (sent, decoder) = (sensor.configuration.confidence, model.decoder.as_ref());
         let novelty = work.assess(sensor.frame(), link, decoder, sent, &mut flags);
         if let Some(number) = sensor.feed_baseline() {
             work.take_baseline(&sensor.baseline);

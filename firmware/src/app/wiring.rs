@@ -79,6 +79,12 @@ impl<'m, const ROWS: usize> Wiring<'m, ROWS> {
         self.rows.get(..self.row_count).unwrap_or_default()
     }
 
+    /// Place in a scan of the row that the reading at `index` is of.
+    pub fn scanned_row(&self, index: usize) -> usize {
+        let place = self.places.get(index).copied().unwrap_or(0);
+        usize::from(place).checked_div(self.columns.count()).unwrap_or(0)
+    }
+
     /// Wires that are scanned.
     pub fn selection(&self) -> Selection<'_> {
         Selection { rows: self.rows(), columns: self.columns }

@@ -6,15 +6,18 @@ use taxel_core::blob::Floats;
 use taxel_core::filter::{State, Track};
 use taxel_core::health::Health;
 use taxel_core::relative::reciprocal;
+use taxel_core::track::{self, Sizes, Tracker};
 use taxel_core::{Decoder, Estimate, Frame, RowStatus};
 
 use super::buffers::cut;
 use super::link::Link;
-use super::sensor::Sensor;
-use crate::link::message::{ConfidenceSent, EstimateReport, Report, Statistics};
+use super::model::InForce;
+use super::sensor::{Scan, Sensor};
+use super::wiring::Wiring;
+use crate::link::message::{ConfidenceSent, Configuration, EstimateReport, Report, Statistics};
 use crate::link::packet::UNASKED;
 use crate::platform::Platform;
-use crate::readout::{Baseline, FrameSource};
+use crate::readout::{Baseline, FrameSource, RowTimes};
 
 /// Memory of a decoder, and its results.
 pub struct Work<'m, const ROWS: usize> {
@@ -25,48 +28,80 @@ pub struct Work<'m, const ROWS: usize> {
     pub reciprocals: &'m mut [f32],
     /// Whether at least one reading has a reciprocal, so that a model with relative inputs may decode.
     pub has_reciprocals: bool,
+    /// Room for the readings of a frame before any is filled.
+    pub measured: &'m mut [f32],
     /// Working space of a decoder.
     pub scratch: &'m mut [f32],
     pub estimate: Estimate<'m>,
     /// State of the filter in time.
     pub filter: State<&'m mut [Track]>,
+    /// State of the tracker of a contact.
+    pub contact: &'m mut track::State,
     /// Standard deviations of the outputs, for a model that tells them.
     pub deviations: &'m mut [f32],
 }
 
 impl<const ROWS: usize> Work<'_, ROWS> {
-    /// Decodes the sensor's frame without its faulty readings. The estimate of a frame that began at `filtered_us` passes
-    /// the filter in time.
+    /// Decodes the sensor's frame without its faulty readings, unless the model's tracker explains it: by the network, whose
+    /// estimate passes the filter in time. A frame that is not of a `scan`, one of a series, is decoded by itself.
     pub fn decode<P: Platform, F: FrameSource>(
         &mut self,
         sensor: &mut Sensor<'_, F, ROWS>,
-        filtered_us: Option<u64>,
+        scan: Option<Scan>,
         link: &mut Link<'_, P>,
-        decoder: Option<&Decoder<'_, ROWS>>,
+        model: &InForce<'_, ROWS>,
     ) -> (u8, Health) {
         let (start_us, start_cycles) = now(link);
         let (frame, health) = sensor.judge_frame();
         let mut flags = if health.is_good() { 0 } else { EstimateReport::FAULTY_READING };
-        if let Some(decoder) = decoder {
+        if let Some(decoder) = &model.decoder {
+            if model.tracker.is_some() {
+                self.measured.iter_mut().zip(&*frame).for_each(|(place, ohm)| *place = *ohm);
+            }
             if !health.is_good() {
                 decoder.fill(frame, self.reciprocals, self.scratch);
             }
-            let mut estimate = cut(&mut self.estimate, self.rows, self.outputs);
-            let decoded = decoder.decode_into(
-                Frame { readings_ohm: sensor.frame(), reciprocals: self.reciprocals },
-                self.scratch,
-                &mut estimate,
-            );
             if mem::take(&mut sensor.is_configured_anew) {
                 self.filter.restart();
+                self.contact.restart();
             }
-            if let Some(start_us) = filtered_us {
-                self.filter.filter(sensor.configuration.filter(), start_us, &mut estimate);
-            }
-            if decoder.metadata().relative_inputs && !self.has_reciprocals {
+            let relative_inputs = decoder.metadata().relative_inputs;
+            let has_baseline = !relative_inputs || self.has_reciprocals;
+            if !has_baseline {
                 flags |= EstimateReport::NO_BASELINE;
             }
-            if decoded == Ok(true) {
+            let Configuration { track, filter_lead_us, .. } = sensor.configuration;
+            let mut row_us = [0.0; ROWS];
+            let tracked = scan.zip(model.tracker).filter(|_| track && has_baseline);
+            let tracked = tracked.map(|(scan, tracker)| {
+                let (row_us, middle_us) = row_times(scan, &sensor.wiring, tracker, &mut row_us);
+                let frame = track::Frame {
+                    readings_ohm: self.measured,
+                    reciprocals: relative_inputs.then_some(&*self.reciprocals),
+                    start_us: scan.start_us,
+                    row_us,
+                    ahead_us: middle_us + filter_lead_us as f32,
+                };
+                (tracker, frame)
+            });
+            let contact = &mut *self.contact;
+            let mut estimate = cut(&mut self.estimate, self.rows, self.outputs);
+            let mut decoded = Ok(false);
+            let mut is_tracked =
+                tracked.is_some_and(|(it, frame)| it.follow(contact, &frame, &mut estimate));
+            if !is_tracked {
+                decoded = decoder.decode_into(
+                    Frame { readings_ohm: sensor.frame(), reciprocals: self.reciprocals },
+                    self.scratch,
+                    &mut estimate,
+                );
+                is_tracked =
+                    tracked.is_some_and(|(it, frame)| it.start(contact, &frame, &mut estimate));
+            }
+            if let Some(Scan { start_us, .. }) = scan.filter(|_| !is_tracked) {
+                self.filter.filter(sensor.configuration.filter(), start_us, &mut estimate);
+            }
+            if decoded == Ok(true) && !is_tracked {
                 flags |= EstimateReport::CLAMPED;
                 let clamped = &mut link.statistics.frames_clamped;
                 *clamped = clamped.saturating_add(1);
@@ -79,7 +114,7 @@ impl<const ROWS: usize> Work<'_, ROWS> {
             cut(&mut self.estimate, self.rows, 0).status.fill(RowStatus::MissingReading);
             flags |= EstimateReport::NO_MODEL;
         }
-        if sensor.is_touched(filtered_us.is_some()) {
+        if sensor.is_touched(scan.is_some()) {
             flags |= EstimateReport::CONTACT;
         }
         let (end_us, end_cycles) = now(link);
@@ -164,7 +199,7 @@ impl<const ROWS: usize> Work<'_, ROWS> {
         }
     }
 
-    /// Takes the baseline's reciprocals. The filter starts anew.
+    /// Takes the baseline's reciprocals. The filter and the tracker start anew.
     pub fn take_baseline(&mut self, baseline: &Baseline<'_>) {
         let known = baseline.frames() > 0;
         self.reciprocals.fill(f32::NAN);
@@ -172,8 +207,24 @@ impl<const ROWS: usize> Work<'_, ROWS> {
             *place = reciprocal(*mean);
         }
         self.filter.restart();
+        self.contact.restart();
         self.has_reciprocals = self.reciprocals.iter().any(|reciprocal| !reciprocal.is_nan());
     }
+}
+
+/// Fills `row_us` with the times at which the tracker's rows were read; returns them and their mean.
+fn row_times<'t, const ROWS: usize>(
+    Scan { row_times: RowTimes { first_us, step_us }, .. }: Scan,
+    wiring: &Wiring<'_, ROWS>,
+    tracker: Tracker<'_>,
+    row_us: &'t mut [f32; ROWS],
+) -> (&'t [f32], f32) {
+    let Sizes { rows, columns, .. } = tracker.sizes();
+    let row_us = row_us.get_mut(..rows).unwrap_or_default();
+    for (row, us) in row_us.iter_mut().enumerate() {
+        *us = first_us + step_us * wiring.scanned_row(row.saturating_mul(columns)) as f32;
+    }
+    (row_us, row_us.iter().sum::<f32>() / rows.max(1) as f32)
 }
 
 /// The time in µs, and the count of the processor's cycles.

@@ -35,7 +35,8 @@ pub enum Request<'a> {
     /// Decode these readings as if they had been scanned, with the faults that a scan would have.
     /// Answered by [`Report::Estimate`].
     ///
-    /// While nothing is scanned, the estimate passes the filter in time, if that is on. Frames of one time count once.
+    /// While nothing is scanned, frames are of one series: tracked, with all rows read at `start_us`, or filtered in time. The
+    /// filter counts frames of one time once.
     Decode {
         /// Number of the frame, repeated in the answer.
         frame: u32,
@@ -283,11 +284,13 @@ pub struct Configuration {
     pub contact_threshold: f32,
     /// Time constant in µs of the filter in time ([`taxel_core::filter`]) that outputs pass; with 0, none.
     pub filter_time_constant_us: u32,
-    /// Time in µs by which the filter extrapolates outputs.
+    /// Time in µs by which the filter and the tracker extrapolate outputs, from the middle of a scan.
     pub filter_lead_us: u32,
     /// Number of scans of which one is reported, with its estimate and its faults: those whose number it divides. All are
     /// decoded and filtered. Readings are sent of every scan.
     pub report_every: u16,
+    /// Whether a model with a tracker ([`taxel_core::track`]) follows the contact; frames that it explains are not filtered.
+    pub track: bool,
 }
 
 /// What is sent of a model's confidence, by its [reading model](taxel_core::reading_model), with the estimate of a scan. An answer to
@@ -339,7 +342,7 @@ pub struct EstimateReport<'a> {
     /// One byte a row: 0 decoded, 1 a reading missing, 2 overflow, 3 no touch.
     pub row_status: &'a [u8],
     /// `rows × outputs` numbers in the units of the model's outputs, NaN where a row is not decoded; none without a
-    /// model. Filtered, if the configuration says so.
+    /// model. Tracked or filtered, if the configuration says so.
     #[serde(borrow)]
     pub outputs: Floats<'a>,
     /// Novelty of the frame in nats: above 0, it is unlike the frames of training. NaN if a reading is missing, and the

@@ -5,7 +5,7 @@ use taxel_core::checksum::CRC_32;
 
 /// Version of the protocol that this crate speaks. A device answers any other version only with
 /// [`Refusal::Version`](super::message::Refusal::Version).
-pub const PROTOCOL_VERSION: u8 = 11;
+pub const PROTOCOL_VERSION: u8 = 12;
 
 /// Number of a packet that answers no request.
 pub const UNASKED: u16 = 0;

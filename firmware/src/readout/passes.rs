@@ -4,8 +4,8 @@ use taxel_core::{ColumnWires, RowWire};
 
 use super::scanner::count_failures;
 use super::{
-    Diagnosis, FrameSource, RunningSource, SCANS_A_ROUND, ScanReport, ScanSettings, Scanning,
-    Selection,
+    Diagnosis, FrameSource, RowTimes, RunningSource, SCANS_A_ROUND, ScanReport, ScanSettings,
+    Scanning, Selection,
 };
 use crate::circuit::{Constants, ConstantsFault, ScannedRow, ZeroPotential};
 
@@ -27,6 +27,9 @@ pub trait Sequencer<const COLUMNS: usize> {
 
     /// Gives up the pass, if one goes on: all rows idle.
     fn stop(&mut self);
+
+    /// When so many lines of a scan are read, all passes together.
+    fn line_times(&self, lines: usize, settings: ScanSettings) -> RowTimes;
 
     /// Tests itself, and gives up the pass, if one goes on. `None` if it cannot.
     fn diagnose(&mut self) -> Option<Diagnosis> {
@@ -214,7 +217,12 @@ impl<Q: Sequencer<COLUMNS>, const ROWS: usize, const LINES: usize, const COLUMNS
         }
         frame.fill(f32::NAN); // rows and columns that are not wired
         let taken = self.convert(frame);
-        let mut report = ScanReport::default();
+        let Plan { line_count, settings, .. } = self.ended;
+        let mut row_times = self.sequencer.line_times(line_count, settings);
+        if self.ended.lines().first() == Some(&None) {
+            row_times.first_us += row_times.step_us;
+        }
+        let mut report = ScanReport { row_times, ..ScanReport::default() };
         count_failures(&mut report, frame.len().saturating_sub(taken));
         report
     }

@@ -5,18 +5,19 @@ use taxel_core::projection::Projection;
 use taxel_core::rbf::float32::{self, Parameters};
 use taxel_core::rbf::{Network, Shape};
 use taxel_core::reading_model::{ReadingModel, Sizes};
+use taxel_core::track::{self, Settings, Tracker};
 use taxel_core::{AlignedBytes, Decoder};
 
-use super::shape::{COLS, OUTPUTS, ROWS, TestFrame};
+use super::shape::{COLS, OUTPUTS, ROWS, TestFrame, frame_at_rest};
 
 /// A blob for this sensor, with `centres` centres and numbers that depend on `seed`.
 pub fn blob(seed: usize, centres: usize) -> AlignedBytes {
-    blob_of(seed, centres, false, None)
+    blob_of(seed, centres, false, None, None)
 }
 
 /// The blob of `blob(3, 4)` for readings relative to the baseline.
 pub fn blob_of_changes() -> AlignedBytes {
-    blob_of(3, 4, true, None)
+    blob_of(3, 4, true, None, None)
 }
 
 fn blob_of(
@@ -24,20 +25,54 @@ fn blob_of(
     centres: usize,
     relative_inputs: bool,
     reading_model: Option<ReadingModel<'_>>,
+    tracker: Option<Tracker<'_>>,
 ) -> AlignedBytes {
     let shape = ModelShape { rows: ROWS, inputs: COLS, outputs: OUTPUTS };
     let metadata = Metadata { relative_inputs, ..Metadata::unnamed(shape) };
     with_network(Shape { inputs: COLS, centres, outputs: OUTPUTS }, seed, |network| {
-        let networks = [network];
-        let parts =
-            ModelParts { reading_model, ..ModelParts::new(&networks, &[0; ROWS], metadata) };
-        encode_to_vec(&parts).unwrap()
+        let (networks, plain) = ([network], [0; ROWS]);
+        let plain = ModelParts::new(&networks, &plain, metadata);
+        encode_to_vec(&ModelParts { reading_model, tracker, ..plain }).unwrap()
     })
 }
 
 /// The blob of `blob(3, 4)` with a reading model, for readings relative to the baseline if `relative_inputs`. Its one component
 /// is of frames near 62 Ω, or near the baseline.
 pub fn blob_with_readings(relative_inputs: bool) -> AlignedBytes {
+    with_readings(relative_inputs, None)
+}
+
+/// That blob with a tracker of two electrodes a row, 3 mm apart.
+pub fn blob_with_tracker(relative_inputs: bool) -> AlignedBytes {
+    let settings = Settings {
+        noise: 0.03,
+        smooth: [[8.0, 3.0, 3.0], [8.0, 3.0, 3.0], [20.0, 0.3, 0.25]],
+        walks: [0.01; 6],
+        start: [[0.5, 0.2]; 9],
+        range: [
+            [0.0, 6.0],
+            [0.0, 6.0],
+            [-0.1, 1.2],
+            [1.5, 5.0],
+            [-0.5, 0.5],
+            [-0.5, 0.5],
+            [-0.6, 0.6],
+            [-0.6, 0.6],
+            [-0.5, 0.9],
+        ],
+    };
+    let mut block = settings.floats().to_vec();
+    block.extend(frame_at_rest().as_flattened());
+    block.extend([1.5, 1.5, 4.5, 1.5, 1.5, 4.5, 4.5, 4.5]);
+    for cell in 0..ROWS * OUTPUTS * COLS {
+        let near = 0.2 + 0.02 * (cell % 5) as f32;
+        block.extend([0.02, 0.01, near, 0.01, 0.0, 0.02, 0.01, 0.0, 0.5 * near]);
+    }
+    let sizes = track::Sizes { rows: ROWS, electrodes: OUTPUTS, columns: COLS };
+    with_readings(relative_inputs, Some(Tracker::new(sizes, &block).unwrap()))
+}
+
+fn with_readings(relative_inputs: bool, tracker: Option<Tracker<'_>>) -> AlignedBytes {
     let (readings, outputs) = (ROWS * COLS, ROWS * OUTPUTS);
     let [middle, scale] = if relative_inputs { [1.0, 20.0] } else { [62.0, 0.5] };
     let block = [
@@ -52,7 +87,7 @@ pub fn blob_with_readings(relative_inputs: bool) -> AlignedBytes {
     ]
     .concat();
     let sizes = Sizes { readings, factors: 1, components: 1, outputs };
-    blob_of(3, 4, relative_inputs, Some(ReadingModel::new(sizes, &block).unwrap()))
+    blob_of(3, 4, relative_inputs, Some(ReadingModel::new(sizes, &block).unwrap()), tracker)
 }
 
 /// A blob of one network for both rows, behind a projection to so many `features`.

@@ -2,7 +2,7 @@
 
 use taxel_firmware::circuit::{Constants, ConstantsFault, ZeroPotential};
 use taxel_firmware::readout::{
-    Diagnosis, FrameSource, RunningSource, ScanReport, ScanSettings, Scanning, Selection,
+    Diagnosis, FrameSource, RowTimes, RunningSource, ScanReport, ScanSettings, Scanning, Selection,
     WaitingSource,
 };
 
@@ -40,7 +40,7 @@ impl Source {
 
 fn report(frame: &[f32]) -> ScanReport {
     let missing = frame.iter().filter(|reading| reading.is_nan());
-    ScanReport { failed_samples: missing.count() as u16 }
+    ScanReport { failed_samples: missing.count() as u16, ..ScanReport::default() }
 }
 
 impl FrameSource for Source {
@@ -97,7 +97,7 @@ impl RunningSource for Source {
 
     fn take(&mut self, frame: &mut [f32]) -> ScanReport {
         frame.copy_from_slice(&self.ended.take().expect("a scan has ended"));
-        report(frame)
+        ScanReport { row_times: RowTimes { first_us: 40.0, step_us: 70.0 }, ..report(frame) }
     }
 
     fn stop(&mut self) {

@@ -3,8 +3,10 @@
 use nalgebra::{DMatrix, DVector};
 use taxel_core::track::{Frame, State, TERMS, Tracker};
 use taxel_core::{Estimate, RowStatus};
+use taxel_data::Table;
 
-use crate::decoder::{Estimates, FrameDecoder, Frames, Timing};
+use crate::decoder::{Decoder, Estimates, FrameDecoder, Frames, Timing};
+use crate::prepared::PreparedModel;
 
 /// Decoder whose estimates a tracker corrects, wherever it explains the readings. Outputs are rounded to f32. Frames whose
 /// times are not known stay as they are decoded. Deviations and novelty stay those of each frame.
@@ -72,6 +74,25 @@ impl<D: FrameDecoder> FrameDecoder for Tracked<'_, D> {
         }
         estimates
     }
+}
+
+/// Outputs of the `model` behind its `tracker`, for one trajectory of `readings` in their units. Each line is read at once, at
+/// these times, and outputs are those expected `ahead_us` later.
+pub fn track_table(
+    model: &PreparedModel<'_>,
+    tracker: Tracker<'_>,
+    readings: &Table,
+    start_us: &[u64],
+    ahead_us: f32,
+) -> Table {
+    let metadata = model.model().metadata();
+    let relative_inputs = metadata.relative_inputs;
+    let tracked = Tracked::new(model.clone().of_inputs(), tracker, relative_inputs, ahead_us);
+    let timing = Some(Timing { start_us, reading_offset_us: &[] });
+    let inputs = model.model_inputs(&readings.values);
+    let estimates = tracked.decode_frames(Frames { readings: &inputs, timing }, start_us.len());
+    let names = metadata.output_names.iter().map(String::from).collect();
+    Table { names, values: estimates.values.into() }
 }
 
 /// Shares of one electrode and one column ([`taxel_core::track`]): the quadratic form that fits `change` best, in the mean over

@@ -8,7 +8,6 @@ use crate::report::Sections;
 use crate::{Error, Result};
 use clap::Args;
 use taxel_core::filter::State;
-use taxel_core::track::Tracker;
 use taxel_data::Clock;
 use taxel_data::csv_file::{self, Column};
 use taxel_data::data_file::{DataFile, FieldTexts};
@@ -16,7 +15,8 @@ use taxel_data::table::Table;
 use taxel_firmware::link::message::EstimateReport;
 use taxel_learn::filtered::filter_frames;
 use taxel_learn::infer::is_missing;
-use taxel_learn::{Decoder, Frames, ModelBlob, PreparedModel, Timing, Tracked};
+use taxel_learn::tracked::track_table;
+use taxel_learn::{ModelBlob, PreparedModel};
 use taxel_recording::{Extras, Frame};
 
 use super::data_file::DataFileArguments;
@@ -105,7 +105,9 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<print::Outcome>
     let settings = arguments.filter.settings();
     let tracker = parsed.tracker().filter(|_| !settings.is_on());
     let mut estimate = match tracker.map(|tracker| (tracker, arguments.period.of_file(&file))) {
-        Some((tracker, Ok(start_us))) => tracked(&model, tracker, &readings, &start_us),
+        Some((tracker, Ok(start_us))) => {
+            track_table(&model, tracker, &readings, &start_us, settings.lead_us as f32)
+        }
         Some((_, Err(cause))) => {
             common.remark(format_args!("note: no contact is tracked: {cause}"));
             model.decode_table(&readings)
@@ -160,22 +162,6 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<print::Outcome>
     result.fact("frames_novel", "novel frames, unlike those of training", "", novel);
     result.fact("file", "file", "", arguments.to.output.display().to_string());
     Ok(print::sections(common, &result))
-}
-
-/// Estimates behind the model's `tracker`, of lines that begin at these times.
-fn tracked(
-    model: &PreparedModel<'_>,
-    tracker: Tracker<'_>,
-    readings: &Table,
-    start_us: &[u64],
-) -> Table {
-    let metadata = model.model().metadata();
-    let tracked = Tracked::new(model.clone().of_inputs(), tracker, metadata.relative_inputs, 0.0);
-    let timing = Some(Timing { start_us, reading_offset_us: &[] });
-    let inputs = model.model_inputs(&readings.values);
-    let estimates = tracked.decode_frames(Frames { readings: &inputs, timing }, start_us.len());
-    let names = metadata.output_names.iter().map(String::from).collect();
-    Table { names, values: estimates.values.into() }
 }
 
 /// Column of novelty, and what follows an output's name in the name of its deviation.

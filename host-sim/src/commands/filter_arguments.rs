@@ -12,7 +12,7 @@ pub struct FilterArguments {
     /// Filter outputs in time, with this time constant in ms; 0 filters nothing (docs/filter.md).
     #[arg(long, value_name = "MS", value_parser = milliseconds)]
     pub filter_ms: Option<u32>,
-    /// Time in ms by which the filter extrapolates outputs: their age when they are used.
+    /// Time in ms by which the filter or the tracker extrapolates outputs: their age when they are used.
     #[arg(long, value_name = "MS", requires = "filter_ms", value_parser = milliseconds)]
     pub lead_ms: Option<u32>,
 }

@@ -9,7 +9,7 @@
 use super::Tracker;
 use super::dent::{Dent, OF_DEPTH};
 use super::linear::{Matrix, Vector, ZERO, mirror};
-use super::walk::{LATENTS, Latents, PLACES, RATES, Settings};
+use super::walk::{LATENTS, Latents, PLACES, RATES, Settings, place_of};
 
 /// Number of shares of an electrode and a column.
 pub const TERMS: usize = 9;
@@ -208,21 +208,21 @@ impl OfRow {
     /// Adds what the row says, which was read `since_s` after the time of the state, to the lower half of `information`. A
     /// latent with a rate counts for both.
     fn add_to(&self, information: &mut Matrix, gradient: &mut Vector, since_s: f32) {
-        for (row, place) in PLACES.into_iter().enumerate() {
-            let of_row = self.gradient[row];
+        for row in 0..LATENTS {
+            let (place, of_row) = (place_of(row), self.gradient[row]);
             gradient[place] += of_row;
             if row < RATES {
-                gradient[place + 1] += since_s * of_row;
+                gradient[2 * row + 1] += since_s * of_row;
             }
-            for (column, other) in PLACES.into_iter().enumerate().take(row + 1) {
-                let value = self.information[row][column];
+            for (column, value) in self.information[row].iter().enumerate().take(row + 1) {
+                let other = place_of(column);
                 information[place][other] += value;
                 if row < RATES {
-                    information[place + 1][other] += since_s * value;
-                    information[place + 1][other + 1] += since_s * since_s * value;
+                    information[2 * row + 1][other] += since_s * value;
+                    information[2 * row + 1][2 * column + 1] += since_s * since_s * value;
                 }
                 if column < RATES && column < row {
-                    information[place][other + 1] += since_s * value;
+                    information[place][2 * column + 1] += since_s * value;
                 }
             }
         }

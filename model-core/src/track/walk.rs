@@ -19,6 +19,12 @@ pub type Latents = [f32; LATENTS];
 /// Place of each latent in the state. The rate of one that has a rate follows it.
 pub const PLACES: [usize; LATENTS] = [0, 2, 4, 6, 7, 8, 9, 10, 11];
 
+/// Place of a latent, so that the compiler sees that it is one.
+pub const fn place_of(latent: usize) -> usize {
+    let place = if latent < RATES { 2 * latent } else { RATES + latent };
+    if place < NUMBERS { place } else { NUMBERS - 1 }
+}
+
 /// What is known of contacts before any reading.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Settings {

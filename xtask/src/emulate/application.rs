@@ -12,7 +12,7 @@ use crate::toolchain::elf;
 pub const IMAGE: &str = APPLICATION;
 
 /// Limits in bytes: flash without a model, and RAM with the stack at its deepest.
-const LIMITS: [(&str, u32); 2] = [("flash", 98_304), ("RAM", 14_336)];
+const LIMITS: [(&str, u32); 2] = [("flash", 98_304), ("RAM", 18_432)];
 
 /// Options of the check with a network a row.
 const OF_ROWS: &[&str] = &["-n10000"];
@@ -22,6 +22,9 @@ const OF_ARRAY: &[&str] = &["-n1000"];
 
 /// Options of the check of a filter in time, of frames a millisecond after one another.
 const FILTERED: &[&str] = &["-n500", "--filter-ms=5", "--lead-ms=2", "--period-ms=1"];
+
+/// Options of the check of a tracker, on a log of contacts that move.
+const TRACKED: &[&str] = &["-n500"];
 
 /// Training options of networks for each row, in the format that takes the longest.
 const ROWS: &[&str] = &["--each-row", "--format=f32"];
@@ -58,18 +61,23 @@ pub fn log() -> PathBuf {
 }
 
 /// Trains the models for the checks, and returns the checks.
-pub fn checks() -> Outcome<[Check; 4]> {
-    let [rows, array] =
-        ["qemu-rows.bin", "qemu-array.bin"].map(|name| target_dir().join(name).into_os_string());
+pub fn checks() -> Outcome<[Check; 5]> {
+    let [rows, array, tracked, moving] =
+        ["qemu-rows.bin", "qemu-array.bin", "qemu-tracked.bin", "qemu-moving.csv"]
+            .map(|name| target_dir().join(name).into_os_string());
     let log = log().into_os_string();
     // Removes the log of the previous run, if there was one.
     let _ = fs::remove_file(&log);
-    train(ROWS, &rows)?;
-    train(&[], &array)?;
+    make(&["train", "press", "--no-refine"], ROWS, &rows)?;
+    make(&["train", "press", "--no-refine"], &[], &array)?;
+    make(&["train", "moving", "--no-refine"], &["--track"], &tracked)?;
+    make(&["synth", "moving"], TRACKED, &moving)?;
+    let (press, model) = (OsStr::new("press"), OsStr::new("--model"));
     Ok([
-        Check::new("application", OF_ROWS, &["--model".as_ref(), &rows, "--log".as_ref(), &log]),
-        Check::new("application with one network", OF_ARRAY, &["--model".as_ref(), &array]),
-        Check::new("application with a filter", FILTERED, &["--model".as_ref(), &array]),
+        Check::new("application", press, OF_ROWS, &[model, &rows, "--log".as_ref(), &log]),
+        Check::new("application with one network", press, OF_ARRAY, &[model, &array]),
+        Check::new("application with a filter", press, FILTERED, &[model, &array]),
+        Check::new("application with a tracker", &moving, TRACKED, &[model, &tracked]),
         Check {
             name: "application by tests",
             arguments: BY_TESTS.iter().map(OsString::from).collect(),
@@ -79,11 +87,12 @@ pub fn checks() -> Outcome<[Check; 4]> {
 }
 
 impl Check {
-    fn new(name: &'static str, checks: &[&str], files: &[&OsStr]) -> Self {
+    fn new(name: &'static str, frames: &OsStr, checks: &[&str], files: &[&OsStr]) -> Self {
         let image = elf(IMAGE).into_os_string();
-        let arguments = TAXEL.iter().chain(&["emulate", "press"]).chain(checks);
-        let files = files.iter().map(OsString::from).chain(["--image".into(), image]);
-        let arguments = arguments.map(OsString::from).chain(files).collect();
+        let checks = checks.iter().map(OsStr::new).chain(files.iter().copied());
+        let arguments = TAXEL.iter().chain(&["emulate"]).map(OsStr::new).chain([frames]);
+        let arguments = arguments.chain(checks).chain(["--image".as_ref(), &*image]);
+        let arguments = arguments.map(OsString::from).collect();
         Self { name, arguments, says: None }
     }
 
@@ -117,9 +126,8 @@ fn check_memory(out: &str) -> Outcome {
     Ok(())
 }
 
-fn train(options: &[&str], model: &OsStr) -> Outcome {
-    let mut command = cargo(TAXEL);
-    run(command.args(["train", "press", "--no-refine"]).args(options).arg("--output").arg(model))
+fn make(command: &[&str], options: &[&str], output: &OsStr) -> Outcome {
+    run(cargo(TAXEL).args(command).args(options).arg("--output").arg(output))
 }
 
 #[cfg(test)]
@@ -133,9 +141,9 @@ mod tests {
                 "flash: {flash} bytes without the model: vector table 8\nRAM: {ram} bytes: variables 8\n"
             )
         };
-        assert!(check_memory(&out(98_304, 14_336)).is_ok());
-        assert!(check_memory(&out(98_305, 14_336)).is_err());
-        assert!(check_memory(&out(98_304, 14_337)).is_err());
+        assert!(check_memory(&out(98_304, 18_432)).is_ok());
+        assert!(check_memory(&out(98_305, 18_432)).is_err());
+        assert!(check_memory(&out(98_304, 18_433)).is_err());
         assert!(check_memory("frames: 7").is_err());
     }
 }

@@ -54,6 +54,11 @@ impl Sequencer<3> for Rc<RefCell<Table>> {
         self.borrow_mut().stops += 1;
     }
 
+    fn line_times(&self, lines: usize, settings: ScanSettings) -> RowTimes {
+        let step_us = f32::from(settings.oversampling);
+        RowTimes { first_us: lines as f32, step_us }
+    }
+
     fn diagnose(&mut self) -> Option<Diagnosis> {
         Some(Diagnosis { items_left: [0, 0, 5, 1], ..Diagnosis::default() })
     }
@@ -96,7 +101,9 @@ fn a_scan_by_passes_is_what_the_circuit_makes_of_the_same_counts() {
         // The next one may begin before the frame is taken.
         scanner.start(ScanSettings { settling_us: 30, oversampling: 1 }, wires);
         assert_eq!(table.borrow_mut().passes.pop(), Some((vec![None, Some(1), Some(0)], 30, 1)));
-        assert_eq!(scanner.take(&mut frame), ScanReport::default());
+        // Of three lines, the first one idle.
+        let row_times = RowTimes { first_us: 3.0 + 10.0, step_us: 10.0 };
+        assert_eq!(scanner.take(&mut frame), ScanReport { row_times, failed_samples: 0 });
         // Ten samples, four a pass, idle first.
         let lines = vec![None, Some(1), Some(0)];
         let expected: Vec<_> = [4, 4, 2].map(|samples| (lines.clone(), 20, samples)).into();

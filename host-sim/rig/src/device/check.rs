@@ -15,7 +15,7 @@ use crate::error::Result;
 #[derive(Debug, Clone, PartialEq)]
 pub struct Plan {
     /// Number of frames on their way at a time: see [`decode_frames`](super::stream::decode_frames).
-    /// A filter needs them one after the other, however many they are.
+    /// A filter and a tracker need them one after the other, however many they are.
     pub window: usize,
     /// Settings of the filter in time that the device and the host pass outputs through.
     pub filter: Settings,

@@ -6,6 +6,7 @@ use taxel_core::filter::{Settings, State};
 use taxel_data::{Progress, Table};
 use taxel_firmware::link::message::{Configuration, EstimateReport};
 use taxel_learn::filtered::filter_frames;
+use taxel_learn::tracked::track_table;
 use taxel_learn::{ModelBlob, PreparedModel};
 
 use super::{Device, stream, upload};
@@ -33,13 +34,14 @@ pub(super) struct Expected {
     baseline_ohm: Option<Vec<f32>>,
     /// Start of each frame in µs.
     start_us: Vec<u64>,
-    /// Filter that the outputs have passed.
+    /// Filter that the outputs have passed, and whether the model's tracker has written them.
     filter: Settings,
+    is_tracked: bool,
 }
 
 impl Expected {
-    /// Answers of the model of `blob` to `frames`, through this filter, and with their baseline if
-    /// its inputs are relative.
+    /// Answers of the model of `blob` to `frames`, through this filter, else behind its tracker, and with their baseline
+    /// if its inputs are relative.
     pub(super) fn new(
         blob: &ModelBlob,
         Frames { readings, baseline_ohm, start_us }: &Frames,
@@ -51,7 +53,12 @@ impl Expected {
             Some(baseline) => model.with_baseline(baseline),
             None => model,
         };
-        let mut outputs = model.decode_table(readings);
+        let lead_us = filter.lead_us as f32;
+        let tracker = model.model().tracker().filter(|_| !filter.is_on());
+        let mut outputs = match tracker {
+            Some(tracker) => track_table(&model, tracker, readings, &start_us, lead_us),
+            None => model.decode_table(readings),
+        };
         let mut state = State::new(vec![[0.0; 2]; outputs.names.len()]);
         filter_frames(&mut state, filter, &start_us, &mut outputs.values);
         let f32s =
@@ -60,7 +67,16 @@ impl Expected {
         let per_frame = [readings.names.len(), outputs.names.len()];
         let confidence = confidence(&model, readings);
         let outputs = f32s(&outputs.values);
-        Self { readings_ohm, outputs, per_frame, confidence, baseline_ohm, start_us, filter }
+        Self {
+            readings_ohm,
+            outputs,
+            per_frame,
+            confidence,
+            baseline_ohm,
+            start_us,
+            filter,
+            is_tracked: tracker.is_some(),
+        }
     }
 
     /// Gives the device the baseline that it needs, if any.
@@ -75,6 +91,7 @@ impl Expected {
             frame_period_us: 0,
             filter_time_constant_us: self.filter.time_constant_us,
             filter_lead_us: self.filter.lead_us,
+            track: self.is_tracked,
             ..Configuration::DEFAULT
         };
         let good = wanted.shorted_below_ohm..=wanted.open_above_ohm;
@@ -116,7 +133,7 @@ impl Expected {
         device.configure(self.configuration())?;
         self.set_baseline(device)?;
         progress.stage("decoding on the device", frames);
-        let window = if self.filter.is_on() { 1 } else { window };
+        let window = if self.filter.is_on() || self.is_tracked { 1 } else { window };
         let readings_ohm = &self.readings_ohm[..frames * self.per_frame[0]];
         let start_us = &self.start_us[..frames];
         let take = |frame, estimate: &EstimateReport<'_>| {
@@ -178,6 +195,7 @@ mod tests {
             baseline_ohm: None,
             start_us: vec![0; 2],
             filter: Settings::default(),
+            is_tracked: false,
         }
     }
 

@@ -152,6 +152,7 @@ pub fn record(
         filter_time_constant_us: filter.time_constant_us,
         filter_lead_us: filter.lead_us,
         report_every: every,
+        track: action.reports.track.unwrap_or(true),
         ..Configuration::DEFAULT
     };
     let mut recorder = is_recording(&action.to.output)

@@ -3,6 +3,7 @@
 use std::time::Duration;
 
 use crate::{Error, Result};
+use clap::builder::BoolishValueParser;
 use clap::{Args, ValueEnum, value_parser};
 use serde::Serialize;
 use taxel_core::Wires;
@@ -54,6 +55,9 @@ pub struct ReportArguments {
     #[command(flatten)]
     #[serde(flatten)]
     pub filter: FilterArguments,
+    /// Whether a model with a tracker (train --track) follows the contact [default: on].
+    #[arg(long, value_name = "on|off", value_parser = BoolishValueParser::new())]
+    pub track: Option<bool>,
     /// Scans of which one is reported, with its estimate and its faults; all are decoded and filtered.
     #[arg(long, value_name = "N", value_parser = value_parser!(u16).range(1..))]
     pub report_every: Option<u16>,

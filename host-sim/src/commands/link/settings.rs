@@ -44,6 +44,7 @@ impl ConfigureArguments {
         c.filter_time_constant_us =
             self.reports.filter.filter_ms.unwrap_or(c.filter_time_constant_us);
         c.filter_lead_us = self.reports.filter.lead_ms.unwrap_or(c.filter_lead_us);
+        c.track = self.reports.track.unwrap_or(c.track);
         c.report_every = self.reports.report_every.unwrap_or(c.report_every);
         c
     }
@@ -118,15 +119,19 @@ fn show(device: &mut Device, common: &Common) -> Result<print::Outcome> {
             c.frame_period_us, c.scan.settling_us, c.scan.oversampling
         ),
     );
+    let [time_constant_ms, lead_ms] =
+        [c.filter_time_constant_us, c.filter_lead_us].map(|us| f64::from(us) / 1e3);
     let filter = if c.filter().is_on() {
-        let [time_constant_ms, lead_ms] =
-            [c.filter_time_constant_us, c.filter_lead_us].map(|us| f64::from(us) / 1e3);
         format!("outputs with a time constant of {time_constant_ms} ms, a lead of {lead_ms} ms")
     } else {
         "nothing".into()
     };
     result.line("filtered in time", filter);
     let yes = |sent: bool| if sent { "yes" } else { "no" };
+    result.line(
+        "tracked by a model that can",
+        format!("{}, with a lead of {lead_ms} ms", yes(c.track)),
+    );
     result.line(
         "sent of each scan",
         format!(
