@@ -31,6 +31,7 @@ mod estimate;
 mod cortex_m4;
 pub mod health;
 pub mod contact;
+pub mod events;
 pub mod filter;
 pub mod rbf;
 pub mod touch;

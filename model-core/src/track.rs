@@ -123,6 +123,13 @@ impl State {
     pub fn restart(&mut self) {
         self.is_known = false;
     }
+
+    /// Place of the contact along x and y in mm, and the standard deviation of it; `None` while there is no contact.
+    pub fn place_mm(&self) -> Option<([f32; 2], f32)> {
+        let Contact { mean, root, .. } = &self.now;
+        let variance = dot(&root[0], &root[0]) + dot(&root[2], &root[2]);
+        self.is_known.then(|| ([mean[0], mean[2]], libm::sqrtf(variance)))
+    }
 }
 
 impl<'a> Tracker<'a> {
