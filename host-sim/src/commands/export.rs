@@ -56,6 +56,9 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<print::Outcome>
         c::write(&blob, &arguments.name, arguments.limits.believed(), folder)?;
     }
     let model = blob.parse();
+    if model.tracker().is_some() {
+        common.remark("note: the source decodes each frame by itself, without the model's tracker");
+    }
     let mut result = Sections::new("Model as source code");
     result.fact("subject", "trained on", "", model.metadata().name);
     result.fact("model_crc", "CRC-32", "", format!("{:08x}", model.crc()));

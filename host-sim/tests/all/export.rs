@@ -56,6 +56,19 @@ fn a_source_in_rust_has_functions_for_the_parts_of_its_model_alone() {
 }
 
 #[test]
+fn a_source_that_leaves_the_tracker_out_says_so() {
+    let folder = Folder::new("export_tracker");
+    let train = ["train", "moving", "-n", "200", "--no-refine", "--centres", "4", "-o", "m.bin"];
+    for is_tracked in [true, false] {
+        folder.succeed(&[&train[..], if is_tracked { &["--track"] } else { &[] }].concat());
+        for language in ["--rust=m.rs", "--c=m"] {
+            let notes = folder.notes(&["export", "m.bin", language]);
+            assert_eq!(notes.contains("without the model's tracker"), is_tracked, "{notes}");
+        }
+    }
+}
+
+#[test]
 fn a_library_in_c_is_a_whole_folder_under_the_name_that_was_given() {
     let folder = Folder::new("export_c");
     let blob = in_testdata("array-fixed16-confidence.bin");
