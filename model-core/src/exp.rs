@@ -13,15 +13,15 @@ pub const LN_2_PARTS: [f32; 2] = [0.693_359_4, -2.121_944_4e-4];
 pub const EXP_COEFFICIENTS: [f32; 7] =
     [0.001_384_461, 0.008_374_151, 0.041_667_98, 0.166_664_32, 0.499_999_94, 1.0, 1.0];
 
-/// e^`x` for `x` ≤ 0, by a polynomial: within 2 ulp on [−87, 0] (tested), no division, no table.
+/// e^`x` for `x` ≤ 87, by a polynomial: within 2 ulp on [−87, 0] (tested), no division, no table.
 ///
 /// Range reduction x = n·ln 2 + r by Cody and Waite (Software Manual for the Elementary
 /// Functions, 1980, ch. 6), then a degree-6 minimax polynomial for e^r on |r| ≤ ½ ln 2 whose
 /// relative error is 2.0e-9; the power of two goes straight into the exponent bits.
 /// `exp(0)` is exactly 1; below −87 the result is 0, so that no subnormal is ever produced.
 ///
-/// The activation's argument −‖x − c‖²/(2σ²) is never positive, so no other argument is needed. The results for
-/// positive numbers and for NaN are not defined ([`Decoder`](crate::Decoder) marks rows with NaN readings instead).
+/// The activation's argument −‖x − c‖²/(2σ²) is never positive; those of a contact's form are not large. The results for
+/// larger numbers and for NaN are not defined ([`Decoder`](crate::Decoder) marks rows with NaN readings instead).
 #[inline]
 pub fn exp(x: f32) -> f32 {
     let [high, low] = LN_2_PARTS;

@@ -24,14 +24,12 @@ use core::mem;
 
 use crate::estimate::{Estimate, RowStatus};
 use crate::rbf::NetworkError;
-use dent::Dent;
-use linear::{Matrix, Vector, ZERO, cholesky, dot, solve_lower, transpose};
+use dent::Form;
+use linear::{Square, cholesky, dot, solve_lower, solve_upper};
+use walk::Vector;
 
 pub use readings::{Frame, Sizes, TERMS};
-pub use walk::{LATENTS, Latents, RATES, Settings};
-
-/// Numbers of the state: latents, and the rates of the first three.
-pub const NUMBERS: usize = LATENTS + RATES;
+pub use walk::{LATENTS, Latents, NUMBERS, RATES, Settings};
 
 /// Most corrections by a frame that follows another, and by the first one.
 const ITERATIONS: usize = 2;
@@ -72,7 +70,7 @@ pub struct Tracker<'a> {
     shares: &'a [[f32; readings::TERMS]],
 }
 
-/// What a tracker remembers between the frames of a trajectory, and its working memory: some 3 kB.
+/// What a tracker remembers between the frames of a trajectory, and its working memory: some 2 kB.
 #[derive(Debug, Clone, PartialEq)]
 pub struct State {
     now: Contact,
@@ -82,7 +80,15 @@ pub struct State {
     is_known: bool,
     /// How far a frame is explained that is not finished.
     followed: Option<Followed>,
-    work: [Matrix; 3],
+    work: Work,
+}
+
+/// Room for a correction: the information of a frame, the first columns of a root, and the product of both.
+#[derive(Debug, Clone, PartialEq)]
+struct Work {
+    information: Square<LATENTS>,
+    columns: Square<LATENTS>,
+    product: Square<LATENTS>,
 }
 
 /// What a frame has shown of the contact before it: the time since, and the mean square of residuals over that of the noise.
@@ -97,7 +103,7 @@ struct Followed {
 struct Contact {
     mean: Vector,
     /// L of the covariance LLᵀ.
-    root: Matrix,
+    root: Square<NUMBERS>,
     at_us: u64,
     /// Mean square of residuals over that of the noise that the blob tells, slowly averaged over so many frames.
     level: f32,
@@ -114,9 +120,16 @@ impl State {
     /// Before the first frame.
     pub const fn new() -> Self {
         // All zero, so that a static of it costs no flash.
-        const NOTHING: Contact =
-            Contact { mean: [0.0; NUMBERS], root: ZERO, at_us: 0, level: 0.0, frames: 0 };
-        Self { now: NOTHING, other: NOTHING, is_known: false, followed: None, work: [ZERO; 3] }
+        const NOTHING: Contact = Contact {
+            mean: [0.0; NUMBERS],
+            root: [[0.0; NUMBERS]; NUMBERS],
+            at_us: 0,
+            level: 0.0,
+            frames: 0,
+        };
+        const ZERO: Square<LATENTS> = [[0.0; LATENTS]; LATENTS];
+        const NO_WORK: Work = Work { information: ZERO, columns: ZERO, product: ZERO };
+        Self { now: NOTHING, other: NOTHING, is_known: false, followed: None, work: NO_WORK }
     }
 
     /// Lets the next frame be the first one.
@@ -126,9 +139,9 @@ impl State {
 
     /// Place of the contact along x and y in mm, and the standard deviation of it; `None` while there is no contact.
     pub fn place_mm(&self) -> Option<([f32; 2], f32)> {
-        let Contact { mean, root, .. } = &self.now;
-        let variance = dot(&root[0], &root[0]) + dot(&root[2], &root[2]);
-        self.is_known.then(|| ([mean[0], mean[2]], libm::sqrtf(variance)))
+        let Contact { mean: [x, y, ..], root: [of_x, of_y, ..], .. } = &self.now;
+        let variance = dot(of_x, of_x) + dot(of_y, of_y);
+        self.is_known.then(|| ([*x, *y], linear::sqrt(variance)))
     }
 }
 
@@ -186,11 +199,11 @@ impl<'a> Tracker<'a> {
         estimate: &mut Estimate<'_>,
     ) -> bool {
         let settings = &self.settings();
-        let State { now, is_known, followed, work, .. } = state;
+        let State { now, other, is_known, followed, work } = state;
         let at_us = frame.middle().1;
         *followed = None;
         let Some(gap_s) = now.gap_s(at_us).filter(|_| *is_known) else { return false };
-        settings.predict(now, gap_s, work);
+        settings.predict(now, gap_s, &mut other.root);
         now.at_us = at_us;
         let residual = self.correct(settings, now, frame, ITERATIONS, work);
         *followed = Some(Followed { gap_s, residual });
@@ -242,31 +255,37 @@ impl<'a> Tracker<'a> {
 
     /// Whether a mean square of `residual`s is one of this level: squares of normal numbers, each of variance 2.
     fn is_explained(&self, residual: f32, level: f32) -> bool {
-        let deviation = libm::sqrtf(2.0 / self.sizes.cells() as f32);
+        let readings = self.sizes.rows.saturating_mul(self.sizes.groups());
+        let deviation = linear::sqrt(2.0 / readings as f32);
         residual < (1.0 + NOT_EXPLAINED * deviation) * level
     }
 
-    /// Corrects a state by a frame of its time. Returns the mean square of residuals before the last correction, over that of
-    /// the noise.
+    /// Corrects a state by a frame of its time, of whose root L only the lower triangle is not 0. Returns the mean square of
+    /// residuals before the last correction, over that of the noise.
     fn correct(
         &self,
         settings: &Settings,
         contact: &mut Contact,
         frame: &Frame<'_>,
         iterations: usize,
-        [information, columns, product]: &mut [Matrix; 3],
+        work: &mut Work,
     ) -> f32 {
-        settings.keep_in_range(&mut contact.mean);
-        let (prior, weight) = (contact.mean, 1.0 / contact.level);
-        transpose(&contact.root, columns);
-        let mut last = f32::NAN;
+        let Work { information, columns, product } = work;
+        let Contact { mean, root, level, .. } = contact;
+        settings.keep_in_range(mean);
+        let (prior, weight) = (*mean, 1.0 / *level);
+        // Readings depend on latents alone, and these on the first columns of L.
+        for (at, column) in columns.iter_mut().enumerate() {
+            *column = core::array::from_fn(|latent| root[latent][at]);
+        }
+        let (mut last, mut inverses) = (f32::NAN, [1.0; LATENTS]);
         for iteration in 0..iterations {
-            if iteration == 1 && last < AS_EXPECTED * contact.level {
+            if iteration == 1 && last < AS_EXPECTED * *level {
                 break;
             }
-            let mut gradient = [0.0; NUMBERS];
-            last = self.inform(settings.noise, &contact.mean, frame, information, &mut gradient);
-            let moved: Vector = core::array::from_fn(|at| contact.mean[at] - prior[at]);
+            let mut gradient = [0.0; LATENTS];
+            last = self.inform(settings.noise, mean, frame, information, &mut gradient);
+            let moved: Latents = core::array::from_fn(|at| mean[at] - prior[at]);
             for (row, gradient) in information.iter_mut().zip(&mut gradient) {
                 *gradient = weight * (*gradient + dot(row, &moved));
                 row.iter_mut().for_each(|number| *number *= weight);
@@ -276,21 +295,24 @@ impl<'a> Tracker<'a> {
                 *of_product = core::array::from_fn(|at| dot(&information[at], column));
             }
             let inner = &mut *information;
-            for row in 0..NUMBERS {
+            for row in 0..LATENTS {
                 for column in 0..=row {
                     inner[row][column] = dot(&product[row], &columns[column]);
                 }
                 inner[row][row] += 1.0;
             }
-            cholesky(inner);
-            let right: Vector = core::array::from_fn(|place| dot(&columns[place], &gradient));
-            let step = solve_lower(inner, &right);
-            for (place, row) in contact.root.iter_mut().enumerate() {
-                let before: Vector = core::array::from_fn(|at| columns[at][place]);
-                *row = solve_lower(inner, &before);
-                contact.mean[place] = prior[place] + dot(row, &step);
+            inverses = cholesky(inner);
+            let right = core::array::from_fn(|at| dot(&columns[at], &gradient));
+            let mut step = solve_lower(inner, &inverses, &right);
+            solve_upper(inner, &inverses, &mut step);
+            for ((number, prior), row) in mean.iter_mut().zip(prior).zip(&*root) {
+                *number = prior + dot(walk::latents(row), &step);
             }
-            settings.keep_in_range(&mut contact.mean);
+            settings.keep_in_range(mean);
+        }
+        for row in root {
+            let solved = solve_lower(information, &inverses, walk::latents(row));
+            row.iter_mut().zip(solved).for_each(|(number, solved)| *number = solved);
         }
         last
     }
@@ -298,12 +320,12 @@ impl<'a> Tracker<'a> {
     /// Makes the `contact` one as the network sees it.
     fn begin(&self, settings: &Settings, estimate: &Estimate<'_>, contact: &mut Contact) {
         let Contact { mean, root, .. } = contact;
-        (*mean, *root) = ([0.0; NUMBERS], ZERO);
-        for (place, [deviation, usual]) in walk::PLACES.into_iter().zip(settings.start) {
+        (*mean, *root) = ([0.0; NUMBERS], [[0.0; NUMBERS]; NUMBERS]);
+        for (place, [deviation, usual]) in settings.start.into_iter().enumerate() {
             (mean[place], root[place][place]) = (usual, deviation);
         }
         for (axis, [rate, deviation, _]) in settings.smooth.into_iter().enumerate() {
-            root[2 * axis + 1][2 * axis + 1] = rate * deviation;
+            root[LATENTS + axis][LATENTS + axis] = rate * deviation;
         }
         let (mut sum, mut deepest, mut moment) = (0.0, 0.0_f32, [0.0; 2]);
         for (place_mm, mm) in self.places_mm.iter().zip(self.depths(estimate)) {
@@ -313,7 +335,7 @@ impl<'a> Tracker<'a> {
             moment = [moment[0] + mm * place_mm[0], moment[1] + mm * place_mm[1]];
         }
         if sum > 0.0 {
-            (mean[0], mean[2], mean[4]) = (moment[0] / sum, moment[1] / sum, deepest);
+            (mean[0], mean[1], mean[2]) = (moment[0] / sum, moment[1] / sum, deepest);
         }
     }
 
@@ -331,11 +353,11 @@ impl<'a> Tracker<'a> {
 
     /// Writes the deformation of every electrode.
     fn write(&self, mean: &Vector, estimate: &mut Estimate<'_>) {
-        let mut latents = walk::PLACES.map(|place| mean[place]);
+        let mut latents = *walk::latents(mean);
         latents[2] = latents[2].max(0.0);
-        let (dent, axes) = (Dent::new(latents), self.axes(estimate));
+        let (form, axes) = (Form::new(latents), self.axes(estimate));
         for (outputs, place) in estimate.outputs.chunks_exact_mut(axes).zip(self.places_mm) {
-            let mm = dent.at(*place).mm;
+            let mm = form.mm(&latents, *place);
             let of_axes = [latents[4] * mm, latents[5] * mm, mm];
             let from = of_axes.len().saturating_sub(axes);
             outputs.iter_mut().zip(of_axes.iter().skip(from)).for_each(|(to, mm)| *to = *mm);

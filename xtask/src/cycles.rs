@@ -12,15 +12,17 @@ use rayon::prelude::*;
 use taxel_learn::cost::{Cost, Design};
 
 use crate::emulate::qemu;
-use crate::images::{BENCH, build_image};
+use crate::images::{BENCH, BENCH_TRACK, build_image};
 use crate::process::{Outcome, read, root, target_dir};
 use crate::toolchain::{Toolchain, elf};
 use image::Image;
 use models::Files;
+use models::train_tracked;
 pub use models::{Model, train_all};
 
-/// Name of the image that is measured.
+/// Names of the images that are measured.
 const IMAGE: &str = "qemu-bench";
+const TRACK_IMAGE: &str = "qemu-bench-track";
 
 /// File of the accepted figures.
 const DATA: &str = "firmware/cycles.csv";
@@ -30,6 +32,9 @@ const HEAD: &str = "compiler,model,scope,instructions,predicted";
 
 /// Scope of the filter in time of a frame's estimate.
 const FILTER: &str = "filter";
+
+/// Scope of following a contact, a frame each millisecond.
+const TRACK: &str = "track";
 
 /// Most per cent by which a prediction may be off.
 const PREDICTED_PERCENT: u64 = 10;
@@ -60,12 +65,17 @@ pub fn run(options: &Options) -> Outcome {
     qemu::present()?;
     let toolchain = Toolchain::find()?;
     build_image(&toolchain, BENCH)?;
-    let (image, compiler) = (Image::read(elf(IMAGE))?, toolchain.compiler()?);
+    build_image(&toolchain, BENCH_TRACK)?;
+    let images = [Image::read(elf(IMAGE))?, Image::read(elf(TRACK_IMAGE))?];
+    let compiler = toolchain.compiler()?;
     let directory = target_dir().join("cycles");
     fs::create_dir_all(&directory).map_err(|cause| cause.to_string())?;
-    let measured = |model: &Model| measure(model, &image, &model.write(&directory)?);
-    let measured: Vec<_> = train_all()?.par_iter().map(measured).collect::<Outcome<_>>()?;
-    let measured = measured.concat();
+    let mut measured = vec![];
+    for (image, models) in images.iter().zip([train_all()?, train_tracked()?]) {
+        let measure = |model: &Model| measure(model, image, &model.write(&directory)?);
+        let figures: Vec<_> = models.par_iter().map(measure).collect::<Outcome<_>>()?;
+        measured.extend(figures.concat());
+    }
     print!("{}", markdown(&measured));
     let mut faults: Vec<String> = measured.iter().filter_map(off).collect();
     if options.accept {
@@ -81,9 +91,13 @@ pub fn run(options: &Options) -> Outcome {
 /// Counts the scopes of a model.
 fn measure(model: &Model, image: &Image, files: &Files) -> Outcome<Vec<Figure>> {
     let design = Design::new(&model.blob);
+    let nothing = Cost { instructions: 0, cycles: 0 };
     let figure = |(scope, instructions): (String, u64)| {
         let predicted = match scope.as_str() {
             FILTER => Cost::of_filter(design.shape),
+            TRACK => {
+                model.blob.parse().tracker().map_or(nothing, |it| Cost::of_tracker(it.sizes()))
+            }
             _ => Cost::of_frame(&design),
         };
         Figure { model: model.name(), scope, instructions, predicted: predicted.instructions }

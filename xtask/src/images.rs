@@ -26,6 +26,10 @@ pub const APPLICATION: &str = "qemu-app";
 pub const BENCH: Packages =
     &["--package", "qemu-image", "--features", "programs", "--bin", "qemu-bench"];
 
+/// The image that it measures of trackers.
+pub const BENCH_TRACK: Packages =
+    &["--package", "qemu-image", "--features", "programs", "--bin", "qemu-bench-track"];
+
 /// The board's image.
 pub const NUCLEO: Packages = &["--package", "nucleo-f446re"];
 

@@ -45,7 +45,7 @@ pub fn blob_with_readings(relative_inputs: bool) -> AlignedBytes {
 /// That blob with a tracker of two electrodes a row, 3 mm apart.
 pub fn blob_with_tracker(relative_inputs: bool) -> AlignedBytes {
     let settings = Settings {
-        noise: 0.03,
+        noise: 0.1,
         smooth: [[8.0, 3.0, 3.0], [8.0, 3.0, 3.0], [20.0, 0.3, 0.25]],
         walks: [0.01; 6],
         start: [[0.5, 0.2]; 9],
@@ -68,7 +68,7 @@ pub fn blob_with_tracker(relative_inputs: bool) -> AlignedBytes {
         let near = 0.2 + 0.02 * (cell % 5) as f32;
         block.extend([0.02, 0.01, near, 0.01, 0.0, 0.02, 0.01, 0.0, 0.5 * near]);
     }
-    let sizes = track::Sizes { rows: ROWS, electrodes: OUTPUTS, columns: COLS };
+    let sizes = track::Sizes { rows: ROWS, electrodes: OUTPUTS, columns: COLS, span: 1 };
     with_readings(relative_inputs, Some(Tracker::new(sizes, &block).unwrap()))
 }
 

@@ -106,7 +106,7 @@ impl<'s> Touches<'s> {
         let (errors, blocks) = of_period.moving.errors(&estimates, times.frame_ms, measure);
         let filter = Settings::default();
         let plain = Way { filter, is_tracked: false, cost, times, errors, blocks };
-        let tracked = self.tracked((blob, model), cost, (device, scan_ms), measure)?;
+        let tracked = self.tracked((blob, model), (device, scan_ms), measure)?;
         // Behind a filter frames take longer, if only a little.
         let slower = self.at(&filter_times)?;
         let estimates = if Arc::ptr_eq(&slower, &of_period) { estimates } else { decode(&slower) };
@@ -125,13 +125,13 @@ impl<'s> Touches<'s> {
     fn tracked(
         &self,
         (blob, model): (&ModelBlob, &PreparedModel<'_>),
-        cost: Cost,
         (device, scan_ms): (&Device, Option<f64>),
         measure: &Measure,
     ) -> Result<Option<Way>> {
         let parsed = blob.parse();
         let Some(tracker) = parsed.tracker() else { return Ok(None) };
-        let cost = cost.plus(Cost::of_tracker(tracker.sizes()));
+        // The network decodes a frame at a start alone.
+        let cost = Cost::of_tracker(tracker.sizes());
         let times = device.times(scan_ms, &cost);
         let of_period = self.at(&times)?;
         let ahead_ms = times.frame_ms + 0.5 * of_period.period_ms;

@@ -76,10 +76,10 @@ const RELATIVE: f64 = 12.0;
 const FILTER: [f64; 3] = [163.0, 24.0, 26.0];
 const FILTER_CYCLES: f64 = 1.7;
 
-/// Instructions of a tracker whose contact presses all electrodes: of a frame, of each electrode, of each cell, and of each
-/// electrode and column; and cycles of one. Counted in QEMU for three sensors; no gate holds them yet.
-const TRACKER: [f64; 4] = [13_000.0, 1_600.0, 270.0, 150.0];
-const TRACKER_CYCLES: f64 = 1.8;
+/// Instructions of a tracker whose contact presses all electrodes: of a frame, of each electrode, of each reading, of each group
+/// of columns, and of each electrode and group; and cycles of one.
+const TRACKER: [f64; 5] = [27_500.0, 330.0, 25.0, 300.0, 53.0];
+const TRACKER_CYCLES: f64 = 1.85;
 
 /// Instructions of what stands before a `network`, for so many `readings` of a frame.
 fn before(network: &NetworkDesign, readings: f64, relative: bool) -> f64 {
@@ -155,10 +155,12 @@ impl Cost {
     /// Cost of [tracking](taxel_core::track) a contact, of a sensor of these sizes.
     #[must_use]
     pub fn of_tracker(sizes: track::Sizes) -> Self {
-        let [frame, electrode, cell, share] = TRACKER;
-        let [electrodes, cells] = [sizes.all_electrodes(), sizes.cells()].map(|it| it as f64);
-        let shares = electrodes * sizes.columns as f64;
-        let instructions = frame + electrode * electrodes + cell * cells + share * shares;
+        let [frame, electrode, cell, group, share] = TRACKER;
+        let groups = sizes.rows.saturating_mul(sizes.groups());
+        let shares = sizes.all_electrodes().saturating_mul(sizes.groups());
+        let counts = [1, sizes.all_electrodes(), sizes.cells(), groups, shares];
+        let each = counts.into_iter().zip([frame, electrode, cell, group, share]);
+        let instructions = each.map(|(count, each)| count as f64 * each).sum();
         Self::new(instructions, TRACKER_CYCLES)
     }
 

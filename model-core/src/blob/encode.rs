@@ -123,7 +123,8 @@ pub fn encode<'b>(parts: &ModelParts<'_>, buffer: &'b mut [u8]) -> Result<&'b [u
     }
     if let Some(tracker) = parts.tracker {
         let electrodes = fit("number of electrodes", tracker.sizes().electrodes, u8::MAX)?;
-        writer.put(&TrackerHeader { tag: TAG_TRACKER, electrodes })?;
+        let span = fit("number of columns of a group", tracker.sizes().span, u8::MAX)?;
+        writer.put(&TrackerHeader { tag: TAG_TRACKER, electrodes, span })?;
         writer.put_block(&[bytemuck::cast_slice(tracker.block())])?;
     }
     for (index, network) in parts.networks.iter().enumerate() {

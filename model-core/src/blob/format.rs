@@ -124,6 +124,8 @@ pub(super) struct TrackerHeader {
     pub tag: u8,
     /// Number of electrodes of a row.
     pub electrodes: u8,
+    /// Number of columns of a group.
+    pub span: u8,
 }
 
 #[cfg(test)]

@@ -98,7 +98,8 @@ pub(super) fn cut_tracker(
     }
     let (header, rest) = take::<TrackerHeader>(bytes, SECTION)?;
     let ModelShape { rows, inputs, outputs } = shape;
-    let sizes = track::Sizes { rows, electrodes: header.electrodes.into(), columns: inputs };
+    let (electrodes, span) = (header.electrodes.into(), header.span.into());
+    let sizes = track::Sizes { rows, electrodes, columns: inputs, span };
     if !sizes.has_outputs(outputs) {
         return Err(DecodeError::Malformed { section: SECTION });
     }

@@ -4,18 +4,25 @@
 //! cell's conductance at rest, is a quadratic form of Δ, whose coefficients are the *shares*: those of x, y, z, x², xy, xz,
 //! y², yz and z².
 //!
-//! A reading R of a cell with R₀ at rest says c = R₀/R, which is h = 1 + Σ shares of Δ where there is no noise.
+//! A reading R of a cell with R₀ at rest says c = R₀/R, which is h = 1 + Σ shares of Δ where there is no noise. Columns that lie
+//! close, beside their distance from the electrodes, say nearly the same: the mean c of a *group* of them counts as one, for a
+//! third of the work.
+
+use core::ops::Range;
 
 use super::Tracker;
-use super::dent::{Dent, OF_DEPTH};
-use super::linear::{Matrix, Vector, ZERO, mirror};
-use super::walk::{LATENTS, Latents, PLACES, RATES, Settings, place_of};
+use super::dent::{Form, OF_DEPTH};
+use super::linear::{Square, mirror, sqrt};
+use super::walk::{LATENTS, Latents, RATES, Settings, Vector, latents};
 
 /// Number of shares of an electrode and a column.
 pub const TERMS: usize = 9;
 
 /// Depth in mm below which an electrode counts as at rest.
 const AT_REST_MM: f32 = 1e-4;
+
+/// Readings whose products are added at once.
+const BATCH: usize = 12;
 
 /// Most electrodes of a row.
 pub const MOST_ELECTRODES: usize = 16;
@@ -29,18 +36,25 @@ pub struct Sizes {
     pub electrodes: usize,
     /// Number of columns.
     pub columns: usize,
+    /// Number of columns of a group; the last one may have fewer.
+    pub span: usize,
 }
 
 impl Sizes {
     /// Whether a row's outputs are deformations of its electrodes: along z, or along x, y and z.
     pub const fn has_outputs(self, outputs: usize) -> bool {
-        let fits = self.electrodes > 0 && self.electrodes <= MOST_ELECTRODES;
+        let fits = self.electrodes > 0 && self.electrodes <= MOST_ELECTRODES && self.span > 0;
         fits && (outputs == self.electrodes || outputs == 3 * self.electrodes)
     }
 
     /// Number of readings in a frame.
     pub const fn cells(self) -> usize {
         self.rows.saturating_mul(self.columns)
+    }
+
+    /// Number of groups of columns.
+    pub const fn groups(self) -> usize {
+        self.columns.div_ceil(if self.span > 0 { self.span } else { 1 })
     }
 
     /// Number of electrodes of all rows.
@@ -50,7 +64,7 @@ impl Sizes {
 
     /// Number of floats in the block.
     pub const fn block_floats(self) -> usize {
-        let shares = self.all_electrodes().saturating_mul(self.columns).saturating_mul(TERMS);
+        let shares = self.all_electrodes().saturating_mul(self.groups()).saturating_mul(TERMS);
         let places = self.all_electrodes().saturating_mul(2);
         shares.saturating_add(places).saturating_add(self.cells()).saturating_add(Settings::FLOATS)
     }
@@ -79,152 +93,167 @@ impl Frame<'_> {
     }
 }
 
-/// What a row says of latents: the lower half of JᵀJ, Jᵀr, the sum of r² and the number of readings.
-struct OfRow {
-    information: [Latents; LATENTS],
-    gradient: Latents,
-    squares: f32,
-    readings: usize,
-}
-
 /// An electrode under a contact.
 #[derive(Clone, Copy)]
 struct Pressed<'a> {
     depth_mm: f32,
     slopes: [f32; 7],
-    /// Shares of the columns, one after the other.
+    /// Shares of the groups, one after the other.
     shares: &'a [[f32; TERMS]],
 }
 
-impl Tracker<'_> {
-    /// What `frame` says of a state, with readings of this noise. Writes JᵀJ, adds Jᵀr, with the derivatives J and the residuals
-    /// r of all readings over their noise; returns the mean of r², NaN without a reading.
+impl<'a> Tracker<'a> {
+    /// What `frame` says of latents, with readings of this noise. Writes JᵀJ, adds Jᵀr, with the derivatives J and the residuals
+    /// r of all readings over their noise. Rows are expected at their own times by the rates, which learn from frame to
+    /// frame alone; returns the mean of r², NaN without a reading.
     pub(super) fn inform(
         &self,
         noise: f32,
         mean: &Vector,
         frame: &Frame<'_>,
-        information: &mut Matrix,
-        gradient: &mut Vector,
+        information: &mut Square<LATENTS>,
+        gradient: &mut Latents,
     ) -> f32 {
-        *information = ZERO;
-        let middle_us = frame.middle().0;
-        let (mut squares, mut readings) = (0.0, 0);
-        for (row, row_us) in frame.row_us.iter().enumerate().take(self.sizes.rows) {
+        *information = [[0.0; LATENTS]; LATENTS];
+        let Sizes { rows, columns, span, .. } = self.sizes;
+        let (middle_us, form) = (frame.middle().0, Form::new(*latents(mean)));
+        let (mut squares, mut readings, mut batch) = (0.0, 0.0, Batch::EMPTY);
+        let mut all = [Pressed { depth_mm: 0.0, slopes: [0.0; 7], shares: &[] }; MOST_ELECTRODES];
+        for (row, row_us) in frame.row_us.iter().enumerate().take(rows) {
             let since_s = (row_us - middle_us) * 1e-6;
-            let mut latents = PLACES.map(|place| mean[place]);
-            for (axis, latent) in latents.iter_mut().take(RATES).enumerate() {
-                *latent += since_s * mean[2 * axis + 1];
+            let mut latents = *latents(mean);
+            for axis in 0..RATES {
+                latents[axis] += since_s * mean[LATENTS + axis];
             }
-            let of_row = self.inform_of_row(row, noise, latents, frame);
-            of_row.add_to(information, gradient, since_s);
-            squares += of_row.squares;
-            readings += of_row.readings;
+            let pressed = self.pressed(row, &form, &latents, &mut all);
+            let cells = row.saturating_mul(columns)..row.saturating_add(1).saturating_mul(columns);
+            for (group, first) in cells.clone().step_by(span.max(1)).enumerate() {
+                let of_group = first..first.saturating_add(span).min(cells.end);
+                let count = of_group.len() as f32;
+                let ratio = self.ratio(of_group, frame) / count;
+                if ratio.is_finite() {
+                    let (expected, slopes) = expect(pressed, group, [latents[4], latents[5]]);
+                    // The noise of a mean is less by the root of the count.
+                    let scale = sqrt(count) / (expected * noise);
+                    let residual = (ratio - expected) * scale;
+                    squares += residual * residual;
+                    readings += 1.0;
+                    if batch.push(slopes, scale, residual) {
+                        batch.add_to(information, gradient);
+                    }
+                }
+            }
         }
+        batch.add_rest_to(information, gradient);
         mirror(information);
-        squares / readings as f32
+        squares / readings
     }
 
-    fn inform_of_row(&self, row: usize, noise: f32, latents: Latents, frame: &Frame<'_>) -> OfRow {
-        let Sizes { electrodes, columns, .. } = self.sizes;
-        let dent = Dent::new(latents);
+    /// The electrodes of a row that a contact presses, at the front of `all`.
+    fn pressed<'p>(
+        &self,
+        row: usize,
+        form: &Form,
+        latents: &Latents,
+        all: &'p mut [Pressed<'a>; MOST_ELECTRODES],
+    ) -> &'p [Pressed<'a>] {
+        let (electrodes, groups) = (self.sizes.electrodes, self.sizes.groups());
         let first = row.saturating_mul(electrodes);
-        let mut pressed =
-            [Pressed { depth_mm: 0.0, slopes: [0.0; 7], shares: &[] }; MOST_ELECTRODES];
         let mut count = 0;
         for electrode in first..first.saturating_add(electrodes) {
             let Some(place) = self.places_mm.get(electrode) else { break };
-            let depth = dent.at(*place);
-            let shares = self.shares.chunks_exact(columns.max(1)).nth(electrode);
-            let (Some(slot), Some(shares)) = (pressed.get_mut(count), shares) else { break };
+            let depth = form.at(latents, *place);
+            let from = electrode.saturating_mul(groups);
+            let shares = self.shares.get(from..from.saturating_add(groups));
+            let (Some(slot), Some(shares)) = (all.get_mut(count), shares) else { break };
             if depth.mm.abs() > AT_REST_MM {
                 *slot = Pressed { depth_mm: depth.mm, slopes: depth.slopes, shares };
                 count += 1;
             }
         }
-        let pressed = pressed.get(..count).unwrap_or_default();
-        let mut of_row = OfRow {
-            information: [[0.0; LATENTS]; LATENTS],
-            gradient: [0.0; LATENTS],
-            squares: 0.0,
-            readings: 0,
-        };
-        let cells = (row.saturating_mul(columns)..).take(columns);
-        for (column, cell) in cells.enumerate() {
-            let Some(ratio) = self.ratio(cell, frame).filter(|ratio| ratio.is_finite()) else {
-                continue;
-            };
-            let (expected, slopes) = expect(pressed, column, [latents[4], latents[5]]);
-            of_row.add(ratio, expected, slopes, noise);
-        }
-        of_row
+        all.get(..count).unwrap_or_default()
     }
 
-    /// Resistance at rest over that of a cell; `None` of a reading that is missing, shorted or open.
-    fn ratio(&self, cell: usize, frame: &Frame<'_>) -> Option<f32> {
-        let ohm = frame.readings_ohm.get(cell).filter(|ohm| ohm.is_finite() && **ohm > 0.0)?;
-        match frame.reciprocals {
-            Some(reciprocals) => Some(1.0 / (ohm * reciprocals.get(cell)?)),
-            None => Some(self.rest_ohm.get(cell)? / ohm),
+    /// Sum over `cells` of the resistance at rest over that of the cell; NaN if a reading is missing, shorted or open.
+    fn ratio(&self, cells: Range<usize>, frame: &Frame<'_>) -> f32 {
+        let known = frame.reciprocals.unwrap_or(self.rest_ohm);
+        let known = known.get(cells.clone()).unwrap_or_default();
+        let readings = frame.readings_ohm.get(cells).unwrap_or_default().iter();
+        let usable = |ohm: f32| if ohm > 0.0 && ohm < f32::INFINITY { ohm } else { f32::NAN };
+        let pairs = readings.map(|ohm| usable(*ohm)).zip(known);
+        if frame.reciprocals.is_some() {
+            pairs.fold(0.0, |sum, (ohm, reciprocal)| sum + 1.0 / (ohm * reciprocal))
+        } else {
+            pairs.fold(0.0, |sum, (ohm, rest)| sum + rest / ohm)
         }
     }
 }
 
-/// The ratio that is expected of a column, and its derivatives by the latents.
-fn expect(pressed: &[Pressed<'_>], column: usize, [along_x, along_y]: [f32; 2]) -> (f32, Latents) {
-    let (mut ratio, mut slopes) = (1.0, [0.0; LATENTS]);
-    for Pressed { depth_mm: dz, slopes: of_depth, shares } in pressed {
-        let Some([x, y, z, xx, xy, xz, yy, yz, zz]) = shares.get(column) else { continue };
-        let (dx, dy) = (along_x * dz, along_y * dz);
-        let by_x = x + 2.0 * xx * dx + xy * dy + xz * dz;
-        let by_y = y + xy * dx + 2.0 * yy * dy + yz * dz;
-        let by_z = z + xz * dx + yz * dy + 2.0 * zz * dz;
-        ratio += 0.5 * ((x + by_x) * dx + (y + by_y) * dy + (z + by_z) * dz);
+/// The ratio that is expected of a group, and its derivatives by the latents.
+#[inline(always)]
+fn expect(pressed: &[Pressed<'_>], group: usize, [along_x, along_y]: [f32; 2]) -> (f32, Latents) {
+    let (mut twice, mut of_depths, mut of_shear) = (2.0, [0.0; OF_DEPTH.len()], [0.0; 2]);
+    for Pressed { depth_mm: dz, slopes, shares } in pressed {
+        let Some([x, y, z, xx, xy, xz, yy, yz, zz]) = shares.get(group) else { continue };
+        let by_x = x + dz * (2.0 * along_x * xx + along_y * xy + xz);
+        let by_y = y + dz * (along_x * xy + 2.0 * along_y * yy + yz);
+        let by_z = z + dz * (along_x * xz + along_y * yz + 2.0 * zz);
         let by_depth = along_x * by_x + along_y * by_y + by_z;
-        for (latent, slope) in OF_DEPTH.into_iter().zip(of_depth) {
-            slopes[latent] += by_depth * slope;
-        }
-        slopes[4] += by_x * dz;
-        slopes[5] += by_y * dz;
+        // A quadratic form is half its slope, and half that at 0.
+        twice += dz * (along_x * x + along_y * y + z + by_depth);
+        of_depths = core::array::from_fn(|at| of_depths[at] + by_depth * slopes[at]);
+        of_shear = [of_shear[0] + by_x * dz, of_shear[1] + by_y * dz];
     }
-    (ratio, slopes)
+    let [x, y, depth, radius, stretch, turn, form] = of_depths;
+    (0.5 * twice, [x, y, depth, radius, of_shear[0], of_shear[1], stretch, turn, form])
 }
 
-impl OfRow {
-    fn add(&mut self, ratio: f32, expected: f32, mut slopes: Latents, noise: f32) {
-        let scale = 1.0 / (expected * noise);
-        let residual = (ratio - expected) * scale;
-        slopes.iter_mut().for_each(|slope| *slope *= scale);
-        for row in 0..LATENTS {
-            self.gradient[row] += slopes[row] * residual;
-            for column in 0..=row {
-                self.information[row][column] += slopes[row] * slopes[column];
-            }
+/// So many readings' derivatives by the latents, and residuals, all over noise: their products are added at once.
+struct Batch {
+    derivatives: [[f32; BATCH]; LATENTS],
+    residuals: [f32; BATCH],
+    count: usize,
+}
+
+impl Batch {
+    const EMPTY: Self =
+        Self { derivatives: [[0.0; BATCH]; LATENTS], residuals: [0.0; BATCH], count: 0 };
+
+    /// Adds a reading. Returns whether there is no room for another.
+    #[inline(always)]
+    fn push(&mut self, slopes: Latents, scale: f32, residual: f32) -> bool {
+        let at = self.count.min(BATCH - 1);
+        for (derivatives, slope) in self.derivatives.iter_mut().zip(slopes) {
+            derivatives[at] = slope * scale;
         }
-        self.squares += residual * residual;
-        self.readings += 1;
+        self.residuals[at] = residual;
+        self.count = at + 1;
+        self.count == BATCH
     }
 
-    /// Adds what the row says, which was read `since_s` after the time of the state, to the lower half of `information`. A
-    /// latent with a rate counts for both.
-    fn add_to(&self, information: &mut Matrix, gradient: &mut Vector, since_s: f32) {
-        for row in 0..LATENTS {
-            let (place, of_row) = (place_of(row), self.gradient[row]);
-            gradient[place] += of_row;
-            if row < RATES {
-                gradient[2 * row + 1] += since_s * of_row;
+    /// Adds what readings say that do not fill the batch.
+    fn add_rest_to(&mut self, information: &mut Square<LATENTS>, gradient: &mut Latents) {
+        if self.count > 0 {
+            for numbers in self.derivatives.iter_mut().chain([&mut self.residuals]) {
+                numbers.iter_mut().skip(self.count).for_each(|number| *number = 0.0);
             }
-            for (column, value) in self.information[row].iter().enumerate().take(row + 1) {
-                let other = place_of(column);
-                information[place][other] += value;
-                if row < RATES {
-                    information[2 * row + 1][other] += since_s * value;
-                    information[2 * row + 1][2 * column + 1] += since_s * since_s * value;
-                }
-                if column < RATES && column < row {
-                    information[place][2 * column + 1] += since_s * value;
-                }
+            self.add_to(information, gradient);
+        }
+    }
+
+    /// Adds what the readings say to the lower half of `information` and to the `gradient`, and forgets them.
+    fn add_to(&mut self, information: &mut Square<LATENTS>, gradient: &mut Latents) {
+        let add = |sum: &mut f32, a: &[f32; BATCH], b: &[f32; BATCH]| {
+            *sum = a.iter().zip(b).fold(*sum, |sum, (a, b)| sum + a * b);
+        };
+        let rows = information.iter_mut().zip(gradient).zip(&self.derivatives);
+        for (row, ((sums, gradient), of_row)) in rows.enumerate() {
+            let of_row = *of_row;
+            add(gradient, &of_row, &self.residuals);
+            for (sum, of_column) in sums.iter_mut().zip(&self.derivatives).take(row + 1) {
+                add(sum, &of_row, of_column);
             }
         }
+        self.count = 0;
     }
 }

@@ -1,9 +1,9 @@
 //! Tests of a tracker on a small sensor, whose readings are what its shares say.
 
-use super::dent::OF_DEPTH;
+use super::dent::{Form, OF_DEPTH};
 use super::*;
 
-const SIZES: Sizes = Sizes { rows: 4, electrodes: 4, columns: 5 };
+const SIZES: Sizes = Sizes { rows: 4, electrodes: 4, columns: 5, span: 1 };
 
 /// A tracker's floats: electrodes 3 mm apart, and shares that tell columns and axes apart.
 fn block() -> Vec<f32> {
@@ -67,16 +67,20 @@ fn contact(time_s: f32) -> Latents {
     [x, y, depth, 2.8, 0.2, -0.1, 0.1, 0.0, 0.1]
 }
 
+fn depth(latents: Latents, place_mm: [f32; 2]) -> f32 {
+    Form::new(latents).at(&latents, place_mm).mm
+}
+
 /// Readings of a contact in Ω, without noise.
 fn readings(tracker: &Tracker<'_>, at: impl Fn(usize) -> Latents) -> Vec<f32> {
     let mut all = vec![];
     for row in 0..SIZES.rows {
         let latents = at(row);
-        let dent = Dent::new(latents);
+        let form = Form::new(latents);
         for column in 0..SIZES.columns {
             let mut ratio = 1.0;
             for electrode in 4 * row..4 * row + 4 {
-                let dz = dent.at(tracker.places_mm[electrode]).mm;
+                let dz = form.at(&latents, tracker.places_mm[electrode]).mm;
                 let [dx, dy] = [latents[4] * dz, latents[5] * dz];
                 let s = tracker.shares[electrode * SIZES.columns + column];
                 let terms = [dx, dy, dz, dx * dx, dx * dy, dx * dz, dy * dy, dy * dz, dz * dz];
@@ -105,11 +109,11 @@ fn track(frames: u32, change: impl Fn(u32, &mut [f32])) -> (f32, u32) {
         let mut ohm = readings(&tracker, |row| contact(start_s + row_us[row] * 1e-6));
         ohm.iter_mut().for_each(|ohm| *ohm *= 1.0 + noise());
         change(frame, &mut ohm);
-        let truth = Dent::new(contact(start_s + 0.003));
+        let truth = contact(start_s + 0.003);
         // A network that is 50 µm off, and a frame behind.
-        let before = Dent::new(contact(start_s));
+        let before = contact(start_s);
         let mut outputs: Vec<f32> =
-            tracker.places_mm.iter().map(|place| before.at(*place).mm + 0.05).collect();
+            tracker.places_mm.iter().map(|place| depth(before, *place) + 0.05).collect();
         let mut status = [RowStatus::Decoded; 4];
         let mut estimate = Estimate { outputs: &mut outputs, status: &mut status };
         let start_us = 2000 * u64::from(frame);
@@ -124,7 +128,7 @@ fn track(frames: u32, change: impl Fn(u32, &mut [f32])) -> (f32, u32) {
         explained += u32::from(is_explained);
         if frame >= frames / 2 && is_explained {
             let errors = tracker.places_mm.iter().zip(&outputs);
-            let errors = errors.map(|(place, mm)| (mm - truth.at(*place).mm).abs());
+            let errors = errors.map(|(place, mm)| (mm - depth(truth, *place)).abs());
             largest = largest.max(errors.fold(0.0, f32::max));
         }
     }
@@ -192,10 +196,10 @@ fn slopes_are_those_of_depths_and_readings() {
         let moved = |by: f32| {
             let mut moved = latents;
             moved[latent] += by;
-            Dent::new(moved).at([4.5, 7.5]).mm
+            depth(moved, [4.5, 7.5])
         };
         let slope = (moved(step) - moved(-step)) / (2.0 * step);
-        let found = Dent::new(latents).at([4.5, 7.5]).slopes[place];
+        let found = Form::new(latents).at(&latents, [4.5, 7.5]).slopes[place];
         assert!((found - slope).abs() < 1e-3, "latent {latent}: {found} {slope}");
     }
     // A state that is off is told the way: the gradient is that of the squares.
@@ -209,17 +213,15 @@ fn slopes_are_those_of_depths_and_readings() {
         ahead_us: 0.0,
     };
     let mut mean = [0.0; NUMBERS];
-    for (place, latent) in walk::PLACES.into_iter().zip(latents) {
-        mean[place] = latent + 0.01;
-    }
-    let (mut information, mut gradient) = (ZERO, [0.0; NUMBERS]);
+    mean.iter_mut().zip(latents).for_each(|(number, latent)| *number = latent + 0.01);
+    let (mut information, mut gradient) = ([[0.0; LATENTS]; LATENTS], [0.0; LATENTS]);
     tracker.inform(1e-3, &mean, &frame, &mut information, &mut gradient);
-    for place in walk::PLACES {
+    for place in 0..LATENTS {
         let squares = |by: f32| {
             let mut moved = mean;
             moved[place] += by;
             let mean_square =
-                tracker.inform(1e-3, &moved, &frame, &mut { ZERO }, &mut [0.0; NUMBERS]);
+                tracker.inform(1e-3, &moved, &frame, &mut { information }, &mut [0.0; LATENTS]);
             mean_square * ohm.len() as f32
         };
         let slope = (squares(step) - squares(-step)) / (2.0 * step);
@@ -234,18 +236,19 @@ fn slopes_are_those_of_depths_and_readings() {
 fn a_walk_spreads_as_its_covariance_says() {
     let block = block();
     let settings = tracker(&block).settings();
-    let State { now: mut tracked, mut work, .. } = State::new();
+    let State { now: mut tracked, .. } = State::new();
+    let mut work = tracked.root;
     // From nothing known, after a long time: the stationary variances; in many steps as in one.
     let variances = |tracked: &Contact| tracked.root.map(|row| dot(&row, &row));
     settings.predict(&mut tracked, 5.0, &mut work);
     let at_once = variances(&tracked);
     for (axis, [rate, deviation, _]) in settings.smooth.into_iter().enumerate() {
         let expected = [deviation * deviation, (deviation * rate).powi(2)];
-        for (found, expected) in at_once[2 * axis..].iter().zip(expected) {
+        for (found, expected) in [at_once[axis], at_once[LATENTS + axis]].iter().zip(expected) {
             assert!((found / expected - 1.0).abs() < 1e-3, "{found} {expected}");
         }
     }
-    let mut steps = Contact { root: ZERO, ..tracked };
+    let mut steps = Contact { root: [[0.0; NUMBERS]; NUMBERS], ..tracked };
     let mut long = steps.clone();
     (0..40).for_each(|_| settings.predict(&mut steps, 0.001, &mut work));
     settings.predict(&mut long, 0.04, &mut work);

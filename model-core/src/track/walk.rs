@@ -4,25 +4,26 @@
 //! Särkkä, "Kalman filtering and smoothing solutions to temporal Gaussian process regression models", 2010): value and rate
 //! after a time dt are e^(−λdt)·[[1 + λdt, dt], [−λ²dt, 1 − λdt]] times those before.
 
-use super::linear::{Matrix, Vector, ZERO, cholesky, dot};
-use super::{Contact, NUMBERS};
+use super::Contact;
+use super::linear::{Square, cholesky, dot};
 use crate::exp::exp;
 
 /// Number of latents.
 pub const LATENTS: usize = 9;
-/// Number of latents that move with a rate: x, y and depth.
+/// Number of latents that move with a rate, the first ones: x, y and depth.
 pub const RATES: usize = 3;
+/// Numbers of the state: latents, and the rates of the first three.
+pub const NUMBERS: usize = LATENTS + RATES;
 
 /// Place along x and y, depth, radius in mm; shear along x and y over depth; and the form: ln a/2, b, ln p.
 pub type Latents = [f32; LATENTS];
 
-/// Place of each latent in the state. The rate of one that has a rate follows it.
-pub const PLACES: [usize; LATENTS] = [0, 2, 4, 6, 7, 8, 9, 10, 11];
+/// A number for each of the state's.
+pub type Vector = [f32; NUMBERS];
 
-/// Place of a latent, so that the compiler sees that it is one.
-pub const fn place_of(latent: usize) -> usize {
-    let place = if latent < RATES { 2 * latent } else { RATES + latent };
-    if place < NUMBERS { place } else { NUMBERS - 1 }
+/// Those of the latents.
+pub fn latents(numbers: &Vector) -> &Latents {
+    numbers.first_chunk().unwrap_or(&[0.0; LATENTS])
 }
 
 /// What is known of contacts before any reading.
@@ -71,21 +72,25 @@ impl Settings {
         let mut later = *mean;
         for (axis, [rate, _, centre]) in self.smooth.into_iter().enumerate() {
             let [[a, b], [c, d]] = transition(rate, dt_s);
-            let (value, speed) = (mean[2 * axis] - centre, mean[2 * axis + 1]);
-            later[2 * axis] = centre + a * value + b * speed;
-            later[2 * axis + 1] = c * value + d * speed;
+            let (value, speed) = (mean[axis] - centre, mean[LATENTS + axis]);
+            later[axis] = centre + a * value + b * speed;
+            later[LATENTS + axis] = c * value + d * speed;
         }
         later
     }
 
     /// Lets a time pass over what is known.
-    pub(super) fn predict(&self, contact: &mut Contact, dt_s: f32, work: &mut [Matrix; 3]) {
+    pub(super) fn predict(
+        &self,
+        contact: &mut Contact,
+        dt_s: f32,
+        covariance: &mut Square<NUMBERS>,
+    ) {
         let Contact { mean, root, .. } = contact;
-        let [covariance, ..] = work;
         *mean = self.mean_after(mean, dt_s);
-        *covariance = ZERO;
+        *covariance = [[0.0; NUMBERS]; NUMBERS];
         for (axis, [rate, deviation, _]) in self.smooth.into_iter().enumerate() {
-            let (value, speed) = (2 * axis, 2 * axis + 1);
+            let (value, speed) = (axis, LATENTS + axis);
             let [[a, b], [c, d]] = transition(rate, dt_s);
             let (values, speeds) = (root[value], root[speed]);
             root[value] = core::array::from_fn(|at| a * values[at] + b * speeds[at]);
@@ -95,7 +100,7 @@ impl Settings {
             covariance[speed][value] = of_both;
             covariance[speed][speed] = of_speed;
         }
-        for (place, walk) in (2 * RATES..NUMBERS).zip(self.walks) {
+        for (place, walk) in (RATES..LATENTS).zip(self.walks) {
             covariance[place][place] = walk * dt_s;
         }
         for row in 0..NUMBERS {
@@ -109,8 +114,8 @@ impl Settings {
 
     /// Keeps latents in their ranges.
     pub(super) fn keep_in_range(&self, mean: &mut Vector) {
-        for (place, [least, most]) in PLACES.into_iter().zip(self.range) {
-            mean[place] = mean[place].max(least).min(most);
+        for (latent, [least, most]) in mean.iter_mut().zip(self.range) {
+            *latent = latent.max(least).min(most);
         }
     }
 }

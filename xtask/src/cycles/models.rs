@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use rayon::prelude::*;
 use taxel_core::rbf::Format;
 use taxel_data::{AtRest, Silent, Stream};
+use taxel_evaluate::tracking;
 use taxel_learn::train::{Features, Kinds, train};
 use taxel_learn::{ModelBlob, Options, Origin, pack};
 use taxel_simulate::outputs::{ContactOutput, ElectrodeOutputs, Outputs, Quantity};
@@ -135,7 +136,8 @@ impl Model {
     /// A file cannot be written.
     pub fn write(&self, directory: &Path) -> Outcome<Files> {
         let Self { shape, format, centres, .. } = self;
-        let stem = format!("{}-{shape:?}-{centres}", format.name()).to_lowercase();
+        let tracked = if self.blob.parse().tracker().is_some() { "-tracked" } else { "" };
+        let stem = format!("{}-{shape:?}-{centres}{tracked}", format.name()).to_lowercase();
         let frame: Vec<u8> = self.frame.iter().flat_map(|reading| reading.to_le_bytes()).collect();
         let written = |kind, bytes: &[u8]| {
             let path = directory.join(&stem).with_extension(kind);
@@ -159,6 +161,19 @@ pub fn train_all() -> Outcome<Vec<Model>> {
     let wanted: Vec<_> = Shape::ALL.into_iter().flat_map(of_shape).collect();
     let made = wanted.into_par_iter().map(|(format, shape, centres)| made(format, shape, centres));
     made.collect()
+}
+
+/// Trains the models whose trackers are measured.
+///
+/// # Errors
+/// As those of [`train_all`].
+pub fn train_tracked() -> Outcome<Vec<Model>> {
+    let tracked = |shape: Shape| {
+        let model = made(Format::Fixed16, shape, 16)?;
+        let blob = tracking::add(&model.blob, &shape.world());
+        Ok(Model { blob: blob.map_err(|cause| cause.to_string())?, ..model })
+    };
+    [Shape::Rows, Shape::Mat, Shape::Wide].into_iter().map(tracked).collect()
 }
 
 fn made(format: Format, shape: Shape, centres: usize) -> Outcome<Model> {
