@@ -4,6 +4,7 @@
 //! must restart. All large memory is in [`Buffers`], for which the program has a static: nothing grows, nothing
 //! is allocated.
 
+use taxel_core::events::Events;
 use taxel_core::filter::State;
 
 use crate::link::message::Configuration;
@@ -95,6 +96,9 @@ impl<'m, P: Platform, F: FrameSource, const ROWS: usize> App<'m, P, F, ROWS> {
             estimate: estimate.whole(),
             filter: State::new(tracks.as_flattened_mut()),
             contact,
+            events: Events::default(),
+            is_followed: false,
+            force: None,
             deviations: deviations.as_flattened_mut(),
         };
         let core = Core { sensor, models: Models::new(capacity), link, work };

@@ -52,6 +52,9 @@ pub trait Platform: Line + Clock + Watchdog + Storage {
         false
     }
 
+    /// Shows outside whether a touch, its load and its slip go on.
+    fn signal(&mut self, _going_on: [bool; 3]) {}
+
     /// Number that no other board of its kind has; zeros on a board without one.
     fn unique_id(&self) -> [u8; 12] {
         [0; 12]

@@ -5,6 +5,7 @@ mod baseline;
 mod confidence;
 mod configuration;
 mod decoding;
+mod events;
 mod filter;
 mod model;
 mod track;

@@ -4,9 +4,9 @@ use crate::mock::{framed, request_bytes};
 use taxel_core::blob::Floats;
 use taxel_firmware::circuit::{ConstantsFault, ZeroPotential};
 use taxel_firmware::link::message::{
-    Configuration, ConfigurationField, EstimateReport, HealthReport, Identity, KeepFault, Kept,
-    KeptBaseline, Memory, ModelFault, ModelIdentity, Refusal, Report, Request, Setting, Statistics,
-    UploadState, UploadStep,
+    Configuration, ConfigurationField, EstimateReport, EventReport, HealthReport, Identity,
+    KeepFault, Kept, KeptBaseline, Memory, ModelFault, ModelIdentity, Refusal, Report, Request,
+    Setting, Statistics, UploadState, UploadStep,
 };
 use taxel_firmware::link::packet::{self, PROTOCOL_VERSION};
 use taxel_firmware::readout::Diagnosis;
@@ -175,6 +175,8 @@ fn reports() -> Vec<Example> {
         ..Statistics::default()
     };
     let configuration = Report::Configuration(Configuration::DEFAULT);
+    let event =
+        EventReport { frame: 300, start_us: START_US, after_us: 2000, changed: 4, going_on: 5 };
     let readings = Report::Readings { frame: 300, start_us: START_US, readings_ohm };
     let (crc_32, threshold) = (0x1234_5678, ConfigurationField::ContactThreshold);
     vec![
@@ -185,6 +187,7 @@ fn reports() -> Vec<Example> {
         ("readings", report_bytes(0, &readings)),
         ("estimate", report_bytes(5, &Report::Estimate(estimate))),
         ("estimate with confidence", report_bytes(5, &Report::Estimate(novel))),
+        ("event", report_bytes(0, &Report::Event(event))),
         ("health", report_bytes(0, &Report::Health(health))),
         ("idle", report_bytes(6, &Report::Upload(UploadState::Idle))),
         ("receiving", report_bytes(6, &Report::Upload(UploadState::Receiving { received: 512 }))),

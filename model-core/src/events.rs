@@ -54,7 +54,7 @@ pub struct Shown {
     pub is_touched: bool,
     /// Load, in its unit; NaN counts as none.
     pub load: f32,
-    /// Place along x and y in mm, and its standard deviation; `None` if it is not known.
+    /// Place along x and y in mm, and its standard deviation; `None` if it is not known, or was found anew.
     pub place_mm: Option<([f32; 2], f32)>,
 }
 

@@ -26,6 +26,8 @@ pub struct Board {
     pub oscillator: Oscillator,
     /// The green light LD2.
     pub led: ErasedPin<Output>,
+    /// Outputs that tell touch, load and slip.
+    pub events: [ErasedPin<Output>; 3],
     /// What reads the sensor.
     pub readout: OwnConverters,
     /// Serial line to the ST-LINK's virtual COM port.
@@ -95,6 +97,11 @@ impl Board {
             reset_cause,
             oscillator,
             led: gpioa.pa5.into_push_pull_output().erase(),
+            events: [
+                gpioc.pc8.into_push_pull_output_in_state(low).erase(),
+                gpioc.pc6.into_push_pull_output_in_state(low).erase(),
+                gpioc.pc5.into_push_pull_output_in_state(low).erase(),
+            ],
             readout,
             serial,
             clock,

@@ -26,6 +26,7 @@ struct Nucleo {
     clock: Clock,
     watchdog: IndependentWatchdog,
     led: ErasedPin<Output>,
+    events: [ErasedPin<Output>; 3],
     journal: Journal<Slot>,
 }
 
@@ -77,6 +78,10 @@ impl Platform for Nucleo {
         set_brown_out_level()
     }
 
+    fn signal(&mut self, going_on: [bool; 3]) {
+        self.events.iter_mut().zip(going_on).for_each(|(pin, on)| pin.set_state(on.into()));
+    }
+
     fn unique_id(&self) -> [u8; 12] {
         let id = Uid::get();
         let [x, y] = [id.x(), id.y()].map(u16::to_le_bytes);
@@ -109,6 +114,7 @@ pub fn run<F: FrameSource>(source: impl FnOnce(OwnConverters) -> F) -> ! {
         clock: board.clock,
         watchdog: board.watchdog,
         led: board.led,
+        events: board.events,
         journal: Journal::new(board.pages),
     };
     let Some(buffers) = buffers() else { restart() };

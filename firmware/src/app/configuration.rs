@@ -2,6 +2,7 @@
 
 use core::ops::RangeInclusive;
 
+use taxel_core::events;
 use taxel_core::filter::Settings;
 use taxel_core::health::Limits;
 
@@ -27,11 +28,18 @@ impl Configuration {
         filter_lead_us: 0,
         report_every: 1,
         track: true,
+        load_threshold: 0.0,
+        slip_mm_per_s: 2.0,
     };
 
     /// Settings of the filter in time.
     pub fn filter(&self) -> Settings {
         Settings { time_constant_us: self.filter_time_constant_us, lead_us: self.filter_lead_us }
+    }
+
+    /// Thresholds of events.
+    pub fn events(&self) -> events::Settings {
+        events::Settings { load: self.load_threshold, slip_mm_per_s: self.slip_mm_per_s }
     }
 
     /// Checks that every field is in its range.
@@ -40,6 +48,7 @@ impl Configuration {
     /// The first field that is not in its range.
     pub fn check(&self) -> Result<(), ConfigurationField> {
         let positive = |value: f32| value.is_finite() && value > 0.0;
+        let not_negative = |value: f32| value.is_finite() && value >= 0.0;
         let limits = [self.shorted_below_ohm, self.open_above_ohm];
         let checks = [
             (
@@ -60,6 +69,8 @@ impl Configuration {
             ),
             (self.filter_lead_us <= Settings::MOST_US, ConfigurationField::FilterLead),
             (self.report_every > 0, ConfigurationField::ReportEvery),
+            (not_negative(self.load_threshold), ConfigurationField::LoadThreshold),
+            (not_negative(self.slip_mm_per_s), ConfigurationField::Slip),
         ];
         checks.into_iter().find(|(good, _)| !good).map_or(Ok(()), |(_, field)| Err(field))
     }
@@ -74,7 +85,7 @@ mod tests {
 
     #[test]
     fn each_field_is_checked() {
-        let cases: [(Change, Result<(), Field>); 21] = [
+        let cases: [(Change, Result<(), Field>); 25] = [
             (|_| (), Ok(())),
             (|it| it.frame_period_us = 0, Ok(())),
             (|it| it.frame_period_us = 99, Err(Field::FramePeriod)),
@@ -96,6 +107,10 @@ mod tests {
             (|it| it.filter_lead_us = 1_000_000, Ok(())),
             (|it| it.filter_lead_us = 1_000_001, Err(Field::FilterLead)),
             (|it| it.report_every = 0, Err(Field::ReportEvery)),
+            (|it| (it.load_threshold, it.slip_mm_per_s) = (3.5, 0.0), Ok(())),
+            (|it| it.load_threshold = -0.1, Err(Field::LoadThreshold)),
+            (|it| it.load_threshold = f32::INFINITY, Err(Field::LoadThreshold)),
+            (|it| it.slip_mm_per_s = f32::NAN, Err(Field::Slip)),
         ];
         for (change, expected) in cases {
             let mut configuration = Configuration::DEFAULT;

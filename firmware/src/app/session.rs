@@ -95,6 +95,7 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
         let names = decoder.map_or(Columns(""), |decoder| decoder.metadata().input_names);
         work.rows = shape.rows;
         work.outputs = shape.rows.saturating_mul(shape.outputs);
+        work.force = decoder.and_then(|it| it.metadata().output_units.position("N"));
         sensor.scan_wires(capacity, names, shape, link);
         if sensor.baseline.frames() == 0 && sensor.capture.is_none() {
             sensor.load_baseline(link);
@@ -108,6 +109,8 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
         let Some((frame, scan)) = sensor.scan_if_due(work.scratch, link) else { return };
         let Scan { start_us, missed, .. } = scan;
         let (mut flags, health) = work.decode(sensor, Some(scan), link, model);
+        let is_touched = flags & EstimateReport::CONTACT != 0;
+        work.tell_events(&sensor.configuration, (frame, start_us), is_touched, link);
         let (sent, decoder) = (sensor.configuration.confidence, model.decoder.as_ref());
         let novelty = work.assess(sensor.frame(), link, decoder, sent, &mut flags);
         if let Some(number) = sensor.feed_baseline() {

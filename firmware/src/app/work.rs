@@ -3,6 +3,7 @@
 use core::mem;
 
 use taxel_core::blob::Floats;
+use taxel_core::events::{Events, Kind, Shown};
 use taxel_core::filter::{State, Track};
 use taxel_core::health::Health;
 use taxel_core::relative::reciprocal;
@@ -14,7 +15,9 @@ use super::link::Link;
 use super::model::InForce;
 use super::sensor::{Scan, Sensor};
 use super::wiring::Wiring;
-use crate::link::message::{ConfidenceSent, Configuration, EstimateReport, Report, Statistics};
+use crate::link::message::{
+    ConfidenceSent, Configuration, EstimateReport, EventReport, Report, Statistics,
+};
 use crate::link::packet::UNASKED;
 use crate::platform::Platform;
 use crate::readout::{Baseline, FrameSource, RowTimes};
@@ -37,6 +40,11 @@ pub struct Work<'m, const ROWS: usize> {
     pub filter: State<&'m mut [Track]>,
     /// State of the tracker of a contact.
     pub contact: &'m mut track::State,
+    pub events: Events,
+    /// Whether the tracker followed the contact to the frame that was decoded last.
+    pub is_followed: bool,
+    /// Place of the model's force among its outputs, if it tells one.
+    pub force: Option<usize>,
     /// Standard deviations of the outputs, for a model that tells them.
     pub deviations: &'m mut [f32],
 }
@@ -89,6 +97,7 @@ impl<const ROWS: usize> Work<'_, ROWS> {
             let mut decoded = Ok(false);
             let mut is_tracked =
                 tracked.is_some_and(|(it, frame)| it.follow(contact, &frame, &mut estimate));
+            self.is_followed = is_tracked;
             if !is_tracked {
                 decoded = decoder.decode_into(
                     Frame { readings_ohm: sensor.frame(), reciprocals: self.reciprocals },
@@ -121,6 +130,33 @@ impl<const ROWS: usize> Work<'_, ROWS> {
         let (us, cycles) = (end_us.wrapping_sub(start_us), end_cycles.wrapping_sub(start_cycles));
         self.count_decoded(us, cycles, &mut link.statistics);
         (flags, health)
+    }
+
+    /// Shows on the board's pins what goes on in the scan that was decoded last, and reports what it changed.
+    pub fn tell_events<P: Platform>(
+        &mut self,
+        configuration: &Configuration,
+        (frame, start_us): (u32, u64),
+        is_touched: bool,
+        link: &mut Link<'_, P>,
+    ) {
+        let outputs = cut(&mut self.estimate, self.rows, self.outputs).outputs;
+        let load = match self.force {
+            Some(place) => outputs.get(place).copied().unwrap_or(f32::NAN),
+            None => outputs.iter().copied().fold(0.0, f32::max),
+        };
+        let place_mm = self.contact.place_mm().filter(|_| self.is_followed);
+        let shown = Shown { start_us, is_touched, load, place_mm };
+        self.events.update(configuration.events(), shown);
+        link.platform().signal(Kind::ALL.map(|kind| self.events.is_on(kind)));
+        let bits = |of: [bool; 3]| of.iter().rev().fold(0, |bits, bit| 2 * bits + u8::from(*bit));
+        let changed = bits(Kind::ALL.map(|kind| self.events.changed(kind).is_some()));
+        if changed != 0 {
+            let going_on = bits(Kind::ALL.map(|kind| self.events.is_on(kind)));
+            let after_us = link.now_us().wrapping_sub(start_us) as u32;
+            let report = EventReport { frame, start_us, after_us, changed, going_on };
+            link.send(UNASKED, &Report::Event(report));
+        }
     }
 
     fn count_decoded(&mut self, us: u32, cycles: u32, s: &mut Statistics) {

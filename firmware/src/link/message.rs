@@ -170,6 +170,8 @@ pub enum Report<'a> {
     Kept(Kept),
     /// What the readout found when it tested itself.
     Diagnosis(Diagnosis),
+    /// A touch, its load or its slip began or ended; sent before the estimate of the scan that shows it.
+    Event(EventReport),
 }
 
 /// Identity of the device, and of the model in force.
@@ -291,6 +293,11 @@ pub struct Configuration {
     pub report_every: u16,
     /// Whether a model with a tracker ([`taxel_core::track`]) follows the contact; frames that it explains are not filtered.
     pub track: bool,
+    /// Load at which its [event](taxel_core::events) begins, in the model's unit: of the force, or else of the largest output.
+    /// With 0, none begins.
+    pub load_threshold: f32,
+    /// Speed in mm/s of a tracked contact's place at which a slip begins; with 0, none begins.
+    pub slip_mm_per_s: f32,
 }
 
 /// What is sent of a model's confidence, by its [reading model](taxel_core::reading_model), with the estimate of a scan. An answer to
@@ -373,6 +380,21 @@ impl EstimateReport<'_> {
     pub const CLAMPED: u8 = 1 << 6;
     /// Flag: the frame's novelty was computed and is above 0.
     pub const NOVEL: u8 = 1 << 7;
+}
+
+/// Events of a touch that a scan shows. Bits are 1 for touch, 2 for load, 4 for slip.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct EventReport {
+    /// Number of the frame.
+    pub frame: u32,
+    /// Time in µs since the device's start at which the scan began.
+    pub start_us: u64,
+    /// Time in µs from there until the events were known, and shown on the board's pins.
+    pub after_us: u32,
+    /// What began or ended.
+    pub changed: u8,
+    /// What goes on.
+    pub going_on: u8,
 }
 
 /// Faulty readings of one frame.

@@ -31,6 +31,9 @@ pub struct Pins {
     pub stopped: u32,
     /// Number of times that the watchdog was fed.
     pub feeds: u32,
+    /// What the board shows of touch, load and slip, and what it showed when the first of the bytes was sent.
+    pub signal: [bool; 3],
+    pub signal_at_first_byte: [bool; 3],
     /// Number of bytes that the host's side still takes; `None` takes all.
     pub room: Option<usize>,
     /// Least time in µs between two bytes that the host's side takes.
@@ -91,6 +94,9 @@ impl Line for Board {
             Some(room) => *room -= 1,
             None => {}
         }
+        if pins.to_host.is_empty() {
+            pins.signal_at_first_byte = pins.signal;
+        }
         pins.to_host.push(byte);
         true
     }
@@ -116,5 +122,9 @@ impl Platform for Board {
 
     fn memory(&self) -> Memory {
         Memory { stack_reserved: 1024, ..Memory::default() }
+    }
+
+    fn signal(&mut self, going_on: [bool; 3]) {
+        self.pins.borrow_mut().signal = going_on;
     }
 }

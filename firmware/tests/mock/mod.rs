@@ -20,6 +20,6 @@ pub(crate) use host::answer;
 pub use host::{CHUNK, Host, TRY, begin, framed, request_bytes, trial_steps};
 pub use models::{
     OVERFLOWING, bits, blob, blob_of_a_row, blob_of_changes, blob_of_features, blob_of_names,
-    blob_with_readings, blob_with_tracker, crc_of, expected,
+    blob_of_units, blob_with_readings, blob_with_tracker, crc_of, expected,
 };
 pub use shape::{COLS, OUTPUTS, ROWS, TestFrame, frame_at_rest, frame_with};

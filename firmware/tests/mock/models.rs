@@ -47,8 +47,18 @@ pub fn blob_with_tracker(relative_inputs: bool) -> AlignedBytes {
     let settings = Settings {
         noise: 0.1,
         smooth: [[8.0, 3.0, 3.0], [8.0, 3.0, 3.0], [20.0, 0.3, 0.25]],
-        walks: [0.01; 6],
-        start: [[0.5, 0.2]; 9],
+        walks: [1e-4; 6],
+        start: [
+            [0.5, 0.2],
+            [0.5, 0.2],
+            [0.5, 0.2],
+            [0.05, 3.0],
+            [0.05, 0.0],
+            [0.05, 0.0],
+            [0.05, 0.0],
+            [0.05, 0.0],
+            [0.05, 0.0],
+        ],
         range: [
             [0.0, 6.0],
             [0.0, 6.0],
@@ -126,6 +136,15 @@ pub fn blob_of_a_row(shape: ModelShape, metadata: Metadata<'_>) -> AlignedBytes 
 pub fn blob_of_names(names: &'static str, outputs: usize) -> AlignedBytes {
     let shape = ModelShape { rows: 1, inputs: names.lines().count(), outputs };
     blob_of_a_row(shape, Metadata { input_names: Columns(names), ..Metadata::unnamed(shape) })
+}
+
+/// The blob of `blob(3, 4)` with these units of its outputs, one on each line.
+pub fn blob_of_units(output_units: &'static str) -> AlignedBytes {
+    let shape = ModelShape { rows: ROWS, inputs: COLS, outputs: OUTPUTS };
+    let metadata = Metadata { output_units: Columns(output_units), ..Metadata::unnamed(shape) };
+    with_network(Shape { inputs: COLS, centres: 4, outputs: OUTPUTS }, 3, |network| {
+        encode_to_vec(&ModelParts::new(&[network], &[0; ROWS], metadata)).unwrap()
+    })
 }
 
 /// What `make` makes of a network of this shape, with an affine tail and numbers that depend on `seed`.

@@ -142,13 +142,15 @@ impl Board<'_> {
             let (start_us, ahead_us) = ((1e6 * start_s) as u64, 1e6 * self.frame_s as f32);
             let frame =
                 Frame { readings_ohm, reciprocals: None, start_us, row_us: &row_us, ahead_us };
-            if !self.tracker.follow(&mut state, &frame, &mut estimate.borrowed()) {
+            let is_followed = self.tracker.follow(&mut state, &frame, &mut estimate.borrowed());
+            if !is_followed {
                 self.tracker.start(&mut state, &frame, &mut estimate.borrowed());
             }
             let change = baseline.largest_relative_deviation(readings_ohm).unwrap_or(0.0);
             let is_touched = touch.update(change, (TOUCH_DEVIATIONS * self.noise) as f32);
             let load = estimate.outputs.iter().copied().fold(0.0, f32::max);
-            let shown = Shown { start_us, is_touched, load, place_mm: state.place_mm() };
+            let place_mm = state.place_mm().filter(|_| is_followed);
+            let shown = Shown { start_us, is_touched, load, place_mm };
             events.update(self.settings, shown);
             let [from, to] =
                 [0.0, self.table.scan_s].map(|after_s| course.truth(start_s + after_s));

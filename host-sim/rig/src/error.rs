@@ -158,6 +158,8 @@ fn configuration_range(field: ConfigurationField) -> String {
         }
         Field::FilterLead => format!("the filter's lead (--lead-ms: 0 to {MOST_FILTER_MS})"),
         Field::ReportEvery => "the scans of which one is reported (--report-every: from 1)".into(),
+        Field::LoadThreshold => "the load of an event (--load-threshold: 0 or above)".into(),
+        Field::Slip => "the speed of a slip (--slip-mm-per-s: 0 or above)".into(),
     }
 }
 

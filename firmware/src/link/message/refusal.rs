@@ -84,6 +84,10 @@ pub enum ConfigurationField {
     FilterLead,
     /// The number of scans of which one is reported: at least 1.
     ReportEvery,
+    /// The threshold for load: not negative, and finite.
+    LoadThreshold,
+    /// The speed of a slip: not negative, and finite.
+    Slip,
 }
 
 /// Fault of an uploaded blob; `taxel inspect` says more about the file itself.

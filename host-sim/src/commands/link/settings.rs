@@ -26,6 +26,12 @@ pub struct ConfigureArguments {
     /// Relative change against the baseline that counts as contact.
     #[arg(long, value_name = "SHARE")]
     contact_threshold: Option<f32>,
+    /// Load of an event, in the unit of the force, or else of the largest output; 0 is off.
+    #[arg(long, value_name = "LOAD")]
+    load_threshold: Option<f32>,
+    /// Speed over the sensor from which a tracked contact slips; 0 is off.
+    #[arg(long, value_name = "MM_PER_S")]
+    slip_mm_per_s: Option<f32>,
     #[command(flatten)]
     reports: ReportArguments,
 }
@@ -41,6 +47,8 @@ impl ConfigureArguments {
         c.shorted_below_ohm = self.shorted_below_ohm.unwrap_or(c.shorted_below_ohm);
         c.open_above_ohm = self.open_above_ohm.unwrap_or(c.open_above_ohm);
         c.contact_threshold = self.contact_threshold.unwrap_or(c.contact_threshold);
+        c.load_threshold = self.load_threshold.unwrap_or(c.load_threshold);
+        c.slip_mm_per_s = self.slip_mm_per_s.unwrap_or(c.slip_mm_per_s);
         c.filter_time_constant_us =
             self.reports.filter.filter_ms.unwrap_or(c.filter_time_constant_us);
         c.filter_lead_us = self.reports.filter.lead_ms.unwrap_or(c.filter_lead_us);
@@ -157,6 +165,12 @@ fn show(device: &mut Device, common: &Common) -> Result<print::Outcome> {
             c.shorted_below_ohm, c.open_above_ohm, c.contact_threshold
         ),
     );
+    let from = |threshold: f32, unit: &str| match threshold {
+        0.0 => "off".into(),
+        threshold => format!("from {threshold}{unit}"),
+    };
+    let [load, slip] = [from(c.load_threshold, ""), from(c.slip_mm_per_s, " mm/s")];
+    result.line("events", format!("load {load}, slip {slip}"));
     if let Some(constants) = &constants {
         let whether = if kept.constants { "kept" } else { "none are kept" };
         result.line("constants", whether);
