@@ -181,11 +181,14 @@ fn smooth(sensor: &Sensor, path: Option<&Path>, deepest: f64) -> ([[f64; 3]; 2],
 
 #[cfg(test)]
 mod tests {
-    use taxel_data::Silent;
+    use taxel_data::{Silent, Table};
+    use taxel_learn::tracked::{Series, track_table};
+    use taxel_simulate::Synthesis;
 
     use super::*;
     use crate::evaluate::moving_contacts::MovingContacts;
     use crate::experiment::Experiment;
+    use crate::moving::Moving;
 
     /// A model of the scene `moving` with a tracker, in the time that a test has.
     fn trained() -> (Experiment, ModelBlob) {
@@ -218,6 +221,30 @@ mod tests {
             assert!(tracked < filtered, "{other}: {tracked} {filtered}");
             scene.world.motion = own;
         }
+    }
+
+    #[test]
+    fn a_reading_that_is_filled_says_nothing_of_a_contact() {
+        let (scene, blob) = trained();
+        let (path, synthesis) = (scene.world.path.unwrap(), Synthesis::new(&scene.world));
+        let moving = Moving::new(&scene, &synthesis, path, ([0.01, 1.0], 1)).unwrap();
+        let readings = &moving.frames.inputs;
+        let (width, start_us): (_, Vec<u64>) =
+            (readings.names.len(), (0..40).map(|frame| 1000 * frame).collect());
+        let faulty: Vec<usize> = (20..40).map(|frame| frame * width + 70).collect();
+        let model = blob.prepare();
+        let track = |with: f64, faulty: &[usize]| {
+            let mut values = readings.values[..40 * width].to_vec();
+            (20..40).for_each(|frame| values[frame * width + 70] *= with);
+            let readings = Table { names: readings.names.clone(), values: values.into() };
+            let (frames, tracker) =
+                (Series { start_us: &start_us, faulty }, model.model().tracker().unwrap());
+            track_table(&model, tracker, &readings, frames, 0.0).values.to_vec()
+        };
+        let missing = track(f64::NAN, &[]);
+        assert!(missing.iter().all(|value| value.is_finite()));
+        assert_eq!(track(1.02, &faulty), missing);
+        assert_ne!(track(1.02, &[]), missing);
     }
 
     #[test]

@@ -5,7 +5,7 @@ use taxel_core::track::{Frame, State, TERMS, Tracker};
 use taxel_core::{Estimate, RowStatus};
 use taxel_data::Table;
 
-use crate::decoder::{Decoder, Estimates, FrameDecoder, Frames, Timing};
+use crate::decoder::{Estimates, FrameDecoder, Frames, Timing};
 use crate::prepared::PreparedModel;
 
 /// Decoder whose estimates a tracker corrects, wherever it explains the readings. Outputs are rounded to f32. Frames whose
@@ -27,24 +27,12 @@ impl<'b, D: FrameDecoder> Tracked<'b, D> {
         let name = format!("{}, tracked", decoder.name());
         Self { decoder, tracker, relative_inputs, ahead_us, name }
     }
-}
 
-impl<D: FrameDecoder> FrameDecoder for Tracked<'_, D> {
-    type State = (D::State, State);
-
-    fn name(&self) -> &str {
-        &self.name
-    }
-
-    fn inputs(&self) -> usize {
-        self.decoder.inputs()
-    }
-
-    fn decode(&self, (decoder, state): &mut Self::State, frames: Frames<'_>) -> Estimates {
-        let mut estimates = self.decoder.decode(decoder, frames);
+    /// Writes over the `values` that a decoder has made of `frames`, wherever the tracker explains them.
+    fn track(&self, state: &mut State, frames: Frames<'_>, values: &mut [f64]) {
         let Some(Timing { start_us, reading_offset_us }) = frames.timing else {
             state.restart();
-            return estimates;
+            return;
         };
         let sizes = self.tracker.sizes();
         let row_us: Vec<f32> = (0..sizes.rows)
@@ -52,8 +40,8 @@ impl<D: FrameDecoder> FrameDecoder for Tracked<'_, D> {
             .collect();
         let ones = vec![1.0; sizes.cells()];
         let reciprocals = self.relative_inputs.then_some(&ones[..]);
-        let outputs = estimates.values.len().checked_div(start_us.len()).unwrap_or(0).max(1);
-        let lines = estimates.values.chunks_exact_mut(outputs);
+        let outputs = values.len().checked_div(start_us.len()).unwrap_or(0).max(1);
+        let lines = values.chunks_exact_mut(outputs);
         let readings = frames.readings.chunks_exact(sizes.cells().max(1));
         for ((values, readings), start_us) in lines.zip(readings).zip(start_us) {
             let readings: Vec<f32> = readings.iter().map(|reading| *reading as f32).collect();
@@ -72,27 +60,54 @@ impl<D: FrameDecoder> FrameDecoder for Tracked<'_, D> {
             }
             values.iter_mut().zip(outputs).for_each(|(value, output)| *value = f64::from(output));
         }
+    }
+}
+
+impl<D: FrameDecoder> FrameDecoder for Tracked<'_, D> {
+    type State = (D::State, State);
+
+    fn name(&self) -> &str {
+        &self.name
+    }
+
+    fn inputs(&self) -> usize {
+        self.decoder.inputs()
+    }
+
+    fn decode(&self, (decoder, state): &mut Self::State, frames: Frames<'_>) -> Estimates {
+        let mut estimates = self.decoder.decode(decoder, frames);
+        self.track(state, frames, &mut estimates.values);
         estimates
     }
 }
 
-/// Outputs of the `model` behind its `tracker`, for one trajectory of `readings` in their units. Each line is read at once, at
-/// these times, and outputs are those expected `ahead_us` later.
+/// Frames one after the other, whose readings are taken at once.
+#[derive(Debug, Clone, Copy)]
+pub struct Series<'a> {
+    /// Start of each frame in µs.
+    pub start_us: &'a [u64],
+    /// Places of readings among those of all frames that were not measured: they are missing, or filled.
+    pub faulty: &'a [usize],
+}
+
+/// Outputs of the `model` behind its `tracker`, for one trajectory of `readings` in their units. Outputs are those expected
+/// `ahead_us` after each frame.
 pub fn track_table(
     model: &PreparedModel<'_>,
     tracker: Tracker<'_>,
     readings: &Table,
-    start_us: &[u64],
+    Series { start_us, faulty }: Series<'_>,
     ahead_us: f32,
 ) -> Table {
-    let metadata = model.model().metadata();
-    let relative_inputs = metadata.relative_inputs;
-    let tracked = Tracked::new(model.clone().of_inputs(), tracker, relative_inputs, ahead_us);
+    let relative_inputs = model.model().metadata().relative_inputs;
+    let tracked = Tracked::new(model.clone(), tracker, relative_inputs, ahead_us);
+    let mut measured = model.model_inputs(&readings.values).into_owned();
+    faulty.iter().for_each(|place| measured[*place] = f64::NAN);
     let timing = Some(Timing { start_us, reading_offset_us: &[] });
-    let inputs = model.model_inputs(&readings.values);
-    let estimates = tracked.decode_frames(Frames { readings: &inputs, timing }, start_us.len());
-    let names = metadata.output_names.iter().map(String::from).collect();
-    Table { names, values: estimates.values.into() }
+    let mut estimates = model.decode_table(readings);
+    let measured = Frames { readings: &measured, timing };
+    tracked.track(&mut State::default(), measured, &mut estimates.values);
+    estimates
 }
 
 /// Shares of one electrode and one column ([`taxel_core::track`]): the quadratic form that fits `change` best, in the mean over

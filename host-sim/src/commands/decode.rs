@@ -15,7 +15,7 @@ use taxel_data::table::Table;
 use taxel_firmware::link::message::EstimateReport;
 use taxel_learn::filtered::filter_frames;
 use taxel_learn::infer::is_missing;
-use taxel_learn::tracked::track_table;
+use taxel_learn::tracked::{Series, track_table};
 use taxel_learn::{ModelBlob, PreparedModel};
 use taxel_recording::{Extras, Frame};
 
@@ -106,7 +106,8 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<print::Outcome>
     let tracker = parsed.tracker().filter(|_| !settings.is_on());
     let mut estimate = match tracker.map(|tracker| (tracker, arguments.period.of_file(&file))) {
         Some((tracker, Ok(start_us))) => {
-            track_table(&model, tracker, &readings, &start_us, settings.lead_us as f32)
+            let frames = Series { start_us: &start_us, faulty: &health.faulty };
+            track_table(&model, tracker, &readings, frames, settings.lead_us as f32)
         }
         Some((_, Err(cause))) => {
             common.remark(format_args!("note: no contact is tracked: {cause}"));

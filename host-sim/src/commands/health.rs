@@ -78,6 +78,9 @@ pub struct Health {
     /// Whether each frame has a faulty reading.
     #[serde(skip)]
     pub is_faulty: Vec<bool>,
+    /// Places of faulty readings among all, filled or not.
+    #[serde(skip)]
+    pub faulty: Vec<usize>,
 }
 
 impl HealthArguments {
@@ -125,6 +128,8 @@ impl HealthArguments {
         }
         let is_faulty =
             readings.lines().map(|line| line.iter().any(|reading| reading.is_nan())).collect();
+        let places = readings.values.iter().enumerate();
+        let faulty = places.filter(|(_, reading)| reading.is_nan()).map(|(at, _)| at).collect();
         let filled = if self.no_fill { None } else { model.filled(&readings.values, baselines) };
         let counts = filled.map_or(vec![], |(values, counts)| {
             readings.values = values.into();
@@ -140,6 +145,7 @@ impl HealthArguments {
             columns,
             faults,
             is_faulty,
+            faulty,
         };
         if health.frames_filled > 0 {
             common.remark(format_args!(

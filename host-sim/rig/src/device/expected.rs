@@ -6,7 +6,7 @@ use taxel_core::filter::{Settings, State};
 use taxel_data::{Progress, Table};
 use taxel_firmware::link::message::{Configuration, EstimateReport};
 use taxel_learn::filtered::filter_frames;
-use taxel_learn::tracked::track_table;
+use taxel_learn::tracked::{Series, track_table};
 use taxel_learn::{ModelBlob, PreparedModel};
 
 use super::{Device, stream, upload};
@@ -56,7 +56,10 @@ impl Expected {
         let lead_us = filter.lead_us as f32;
         let tracker = model.model().tracker().filter(|_| !filter.is_on());
         let mut outputs = match tracker {
-            Some(tracker) => track_table(&model, tracker, readings, &start_us, lead_us),
+            Some(tracker) => {
+                let frames = Series { start_us: &start_us, faulty: &[] };
+                track_table(&model, tracker, readings, frames, lead_us)
+            }
             None => model.decode_table(readings),
         };
         let mut state = State::new(vec![[0.0; 2]; outputs.names.len()]);
