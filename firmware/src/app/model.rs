@@ -36,8 +36,8 @@ impl<'a, const ROWS: usize> InForce<'a, ROWS> {
     ) -> Option<()> {
         let blob = blob_in_slot(bytes);
         let model = check(capacity, blob).ok()?;
-        let decoder = self.decoder.insert(Decoder::new(model).ok()?);
-        self.tracker = decoder.model().tracker();
+        self.tracker = model.tracker();
+        let decoder = Self::put(&mut self.decoder, model)?;
         let (shape, metadata) = (decoder.shape(), decoder.metadata());
         let identity = ModelIdentity {
             crc_32: decoder.model_crc(),
@@ -54,6 +54,15 @@ impl<'a, const ROWS: usize> InForce<'a, ROWS> {
         };
         (self.identity, self.blob) = (Some(identity), blob);
         Some(())
+    }
+
+    /// Makes a decoder of a model in its place.
+    #[inline(never)] // so that a model is checked before this takes stack
+    fn put<'d>(
+        place: &'d mut Option<Decoder<'a, ROWS>>,
+        model: Model<'a>,
+    ) -> Option<&'d Decoder<'a, ROWS>> {
+        Some(place.insert(Decoder::new(model).ok()?))
     }
 
     /// Name of the model's scene or data set, cut after [`MOST_NAME_BYTES`].
