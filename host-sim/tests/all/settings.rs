@@ -93,7 +93,7 @@ fn a_board_is_set_up_from_the_command_line_and_stays_so() {
     assert!(page.contains("drive: 0.21000 V of 3.3000 V") && page.contains("0.050"), "{page}");
     let configure = ["configure", "--period-us", "20000", "--send", "both", "--settling-us", "55"];
     let more =
-        ["--oversampling", "4", "--filter-ms", "30", "--lead-ms", "4", "--report-every", "3"];
+        ["--oversampling=4", "--filter-ms=30", "--lead-ms=4", "--report-every=3", "--track=off"];
     let configure = [&configure[..], &more].concat();
     let page = link(&[&configure[..], &["--contact-threshold", "0.05"]].concat());
     assert!(page.contains("configuration: kept"), "{page}");
@@ -106,6 +106,7 @@ fn a_board_is_set_up_from_the_command_line_and_stays_so() {
     for said in [
         "a scan every 20000 µs, 55 µs settling, 4 samples a reading",
         "outputs with a time constant of 30 ms, a lead of 4 ms",
+        "tracked by a model that can: no, with a lead of 4 ms",
         "readings yes, estimates yes (one of 3), of confidence nothing",
         "shorted below 5 Ω, open above 1000 Ω, contact from 0.05",
         "constants: kept",

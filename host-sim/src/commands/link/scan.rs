@@ -56,7 +56,7 @@ pub struct ReportArguments {
     #[serde(flatten)]
     pub filter: FilterArguments,
     /// Whether a model with a tracker (train --track) follows the contact [default: on].
-    #[arg(long, value_name = "on|off", value_parser = BoolishValueParser::new())]
+    #[arg(long, value_name = "on|off", value_parser = BoolishValueParser::new(), hide_possible_values = true)]
     pub track: Option<bool>,
     /// Scans of which one is reported, with its estimate and its faults; all are decoded and filtered.
     #[arg(long, value_name = "N", value_parser = value_parser!(u16).range(1..))]
