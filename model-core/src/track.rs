@@ -204,6 +204,7 @@ impl<'a> Tracker<'a> {
         *followed = None;
         let Some(gap_s) = now.gap_s(at_us).filter(|_| *is_known) else { return false };
         settings.predict(now, gap_s, &mut other.root);
+        settings.forget_form(now);
         now.at_us = at_us;
         let residual = self.correct(settings, now, frame, ITERATIONS, work);
         *followed = Some(Followed { gap_s, residual });

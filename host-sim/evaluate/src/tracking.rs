@@ -128,8 +128,10 @@ fn deformations(deepest_mm: f64, most_shear: f64) -> Vec<Vector3> {
     all
 }
 
-/// Most that a depth may be, over the deepest of the scene.
+/// Most that a depth may be, over the deepest of the scene; and a radius and a shear over theirs, since contacts that nobody
+/// thought of are wider or sheared more.
 const MOST_DEPTH: f64 = 1.2;
+const MOST: f64 = 1.6;
 
 /// How contacts of this world move, which are as wide, deep and sheared as `press`.
 fn settings(world: &World, press: &Dent) -> Settings {
@@ -148,9 +150,9 @@ fn settings(world: &World, press: &Dent) -> Settings {
         [place, 0.5 * x_mm, 0.0, x_mm],
         [place, 0.5 * y_mm, 0.0, y_mm],
         [0.15 * deepest, 0.0, -0.1 * deepest, MOST_DEPTH * deepest],
-        [(width / 12.0_f64.sqrt()).max(0.05 * high), 0.5 * (low + high), 0.85 * low, 1.1 * high],
-        [(0.4 * shear).max(1e-3), 0.0, -shear, shear],
-        [(0.4 * shear).max(1e-3), 0.0, -shear, shear],
+        [(width / 12.0_f64.sqrt()).max(0.05 * high), 0.5 * (low + high), low / MOST, MOST * high],
+        [(0.4 * shear).max(1e-3), 0.0, -MOST * shear, MOST * shear],
+        [(0.4 * shear).max(1e-3), 0.0, -MOST * shear, MOST * shear],
         [FORM[0][0], 0.0, -FORM[0][1], FORM[0][1]],
         [FORM[1][0], 0.0, -FORM[1][1], FORM[1][1]],
         [FORM[2][0], 0.0, -0.5, FORM[2][1]],

@@ -5,7 +5,7 @@
 //! after a time dt are e^(−λdt)·[[1 + λdt, dt], [−λ²dt, 1 − λdt]] times those before.
 
 use super::Contact;
-use super::linear::{Square, cholesky, dot};
+use super::linear::{Square, cholesky, dot, sqrt};
 use crate::exp::exp;
 
 /// Number of latents.
@@ -17,6 +17,10 @@ pub const NUMBERS: usize = LATENTS + RATES;
 
 /// Place along x and y, depth, radius in mm; shear along x and y over depth; and the form: ln a/2, b, ln p.
 pub type Latents = [f32; LATENTS];
+
+/// Share of the deepest depth below which a contact hardly touches, and of the deviations at a start that its form then has.
+const LIGHT: f32 = 0.05;
+const FORGOTTEN: f32 = 0.5;
 
 /// A number for each of the state's.
 pub type Vector = [f32; NUMBERS];
@@ -110,6 +114,27 @@ impl Settings {
         }
         cholesky(covariance);
         *root = *covariance;
+    }
+
+    /// Lets a contact that hardly touches have another radius, shear and form: readings tell nothing of them, and those of the
+    /// next touch may be others.
+    pub(super) fn forget_form(&self, contact: &mut Contact) {
+        let Contact { mean, root, .. } = contact;
+        if mean[2] > LIGHT * self.range[2][1] {
+            return;
+        }
+        for latent in RATES..LATENTS {
+            root[latent] = [0.0; NUMBERS];
+            root[latent][latent] = FORGOTTEN * self.start[latent][0];
+        }
+        for rate in LATENTS..NUMBERS {
+            let mut variance = root[rate][rate] * root[rate][rate];
+            for latent in RATES..LATENTS {
+                variance += root[rate][latent] * root[rate][latent];
+                root[rate][latent] = 0.0;
+            }
+            root[rate][rate] = sqrt(variance);
+        }
     }
 
     /// Keeps latents in their ranges.
