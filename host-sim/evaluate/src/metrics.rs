@@ -228,7 +228,7 @@ impl LimitSummary {
         });
         let limits: Vec<String> = limits.collect();
         format!(
-            "Least possible RMSE of any decoder, from {} frames: {}.",
+            "Least possible RMSE of any decoder, from {} posteriors: {}.",
             self.frames,
             limits.join(", ")
         )

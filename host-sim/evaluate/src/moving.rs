@@ -10,6 +10,7 @@ use taxel_data::random::Stream;
 use taxel_data::table::Table;
 use taxel_learn::filtered::filter_frames;
 use taxel_learn::{Decoder, Frames, Timing};
+use taxel_limit::Reference;
 use taxel_simulate::Synthesis;
 use taxel_simulate::path::Path;
 use taxel_simulate::timetable::Timetable;
@@ -121,16 +122,26 @@ impl Moving {
         estimates.chunks_exact(scans * outputs).flat_map(of_trajectory).collect()
     }
 
-    /// Errors of the newest finished estimates at all moments, of the `estimates` of all frames (`frames × outputs`). There
-    /// is no ratio to the limit, which is that of single frames.
+    /// Errors of the newest finished estimates at all moments, of the `estimates` of all frames (`frames × outputs`), and their
+    /// ratios to the limit of contacts that move, if the `measure` has it.
     pub fn errors(
         &self,
         estimates: &[f64],
         finished_ms: f64,
         measure: &Measure,
     ) -> (Vec<Errors>, Blocks) {
-        let measure = Measure { limit: None, ..measure.clone() };
-        metrics::with_blocks(&self.truth, &self.held(estimates, finished_ms), &measure)
+        let held = self.held(estimates, finished_ms);
+        let (mut errors, blocks) = metrics::with_blocks(&self.truth, &held, measure);
+        let limits = measure.limit.iter().flat_map(Reference::limits);
+        for (errors, limit) in errors.iter_mut().zip(limits) {
+            let ratio = errors.rmse / limit.limit;
+            let of_blocks = blocks.get(&errors.group).into_iter().flatten().copied();
+            let share = metrics::standard_error(of_blocks) / errors.rmse;
+            let share = share.hypot(limit.limit_standard_error / limit.limit);
+            errors.ratio_to_limit = Some(ratio);
+            errors.ratio_standard_error = Some(ratio * share);
+        }
+        (errors, blocks)
     }
 }
 

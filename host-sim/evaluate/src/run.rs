@@ -140,10 +140,12 @@ pub struct RowErrors {
     pub errors: Vec<Errors>,
 }
 
-/// Trains on `subject` with `options`, judges the model and returns its results and the blob.
+/// Trains on `subject` with `options`, judges the model and returns its results and the blob. The limit of contacts that move is
+/// computed on so many trajectories if it is asked for.
 pub fn run(
     subject: &Subject,
     options: &Options,
+    limit_frames: Option<usize>,
     progress: &dyn Progress,
 ) -> Result<(RunResult, ModelBlob)> {
     progress.stage("read or synthesise", 1);
@@ -156,7 +158,7 @@ pub fn run(
     let blob = training.blob(options, progress)?;
     let network = blob.prepare().of_inputs();
 
-    let (measure, limit) = subject.measure(progress);
+    let (measure, limit) = subject.measure(limit_frames, progress);
     progress.stage("decode and evaluate", 1);
     let baselines: Vec<Box<dyn Decoder>> =
         BASELINES.iter().filter_map(|b| b.fit(&training.frames)).collect();
@@ -216,7 +218,7 @@ pub fn run(
     };
     match subject {
         Subject::Scene(scene) => {
-            result.moving = MovingContacts::new(scene, &blob, &baselines)?;
+            result.moving = MovingContacts::new(scene, &blob, &baselines, limit_frames)?;
             result.scene = Some(scene_summary(scene));
         }
         Subject::Measured(data) => {

@@ -162,11 +162,17 @@ impl Subject {
     }
 
     /// Measure for errors on the test frames, with their ratio to the limit of all readings of a frame where it is known, and
-    /// a summary of that limit or the reason why there is none. Ratios are formed on the first test frames.
-    pub fn measure(&self, progress: &dyn Progress) -> (Measure, LimitSummary) {
+    /// a summary of that limit or the reason why there is none. Ratios are formed on the first test frames, as many as suffice
+    /// unless their number is given.
+    pub fn measure(
+        &self,
+        limit_frames: Option<usize>,
+        progress: &dyn Progress,
+    ) -> (Measure, LimitSummary) {
         match self {
             Self::Scene(scene) => {
-                let frames = Reference::few_frames(&scene.world).min(scene.test_frames);
+                let frames = limit_frames.unwrap_or_else(|| Reference::few_frames(&scene.world));
+                let frames = frames.min(scene.test_frames);
                 let limit = Reference::new(&scene.world, frames, progress);
                 let summary = LimitSummary::new(&limit);
                 (Measure { limit: limit.ok(), ..scene.measure() }, summary)

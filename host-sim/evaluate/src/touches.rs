@@ -10,6 +10,7 @@ use taxel_data::table::Table;
 use taxel_learn::cost::Cost;
 use taxel_learn::filtered::{Movement, settings_for};
 use taxel_learn::{Decoder, ModelBlob, PreparedModel, Tracked};
+use taxel_limit::{Reference, Refusal};
 use taxel_simulate::Synthesis;
 use taxel_simulate::path::Path;
 
@@ -164,6 +165,31 @@ impl<'s> Touches<'s> {
         let estimates = decoder.decode_all(&scanned.moving.frames.inputs.values, 1);
         let (errors, _) = scanned.moving.errors(&estimates.values, scanned.scan_ms, measure);
         Ok(DecoderErrors::new(decoder.name(), errors))
+    }
+
+    /// Limit at a moment of each of so many trajectories, from all scans of `scan_ms` that are finished by then: one after the
+    /// other. It takes no time.
+    ///
+    /// # Errors
+    /// [`Refusal`] for contacts that are not modelled, and if the sample does not carry the figures.
+    pub fn limit(
+        &self,
+        scan_ms: Option<f64>,
+        trajectories: Option<usize>,
+    ) -> std::result::Result<Reference, Refusal> {
+        /// Golden section, by whose multiples moments are spread evenly.
+        const SECTION: f64 = 0.618_033_988_749_895;
+        let (scan_ms, trajectories) =
+            (scan_ms.unwrap_or_default(), trajectories.ok_or(Refusal::Moving)?);
+        let scanned = self.of(scan_ms, scan_ms);
+        let scanned = scanned.map_err(|_| Refusal::MovingWith("such a scan"))?;
+        let Moving { timetable, moments_s, .. } = &scanned.moving;
+        let moments = (0..trajectories).map(|number| {
+            let share = ((number as f64 + 0.5) * SECTION).fract();
+            moments_s[(share * moments_s.len() as f64) as usize]
+        });
+        let moments: Vec<f64> = moments.collect();
+        Reference::moving(&self.scene.world, (timetable, scan_ms / 1000.0), &moments)
     }
 
     fn of(&self, scan_ms: f64, period_ms: f64) -> Result<Arc<OfPeriod>> {

@@ -191,6 +191,7 @@ mod tests {
     use crate::evaluate::moving_contacts::MovingContacts;
     use crate::experiment::Experiment;
     use crate::moving::Moving;
+    use crate::touches::Touches;
 
     /// A model of the scene `moving` with a tracker, in the time that a test has.
     fn trained() -> (Experiment, ModelBlob) {
@@ -203,7 +204,7 @@ mod tests {
 
     /// RMSE in mm of the model alone, behind a filter, and tracked, on contacts of the scene that move.
     fn errors(scene: &Experiment, blob: &ModelBlob) -> [f64; 3] {
-        let moving = MovingContacts::new(scene, blob, &[]).unwrap().unwrap();
+        let moving = MovingContacts::new(scene, blob, &[], None).unwrap().unwrap();
         let [plain, filtered, tracked] = &moving.ways[..] else { panic!("three ways") };
         assert!(tracked.is_tracked && !filtered.is_tracked);
         [plain, filtered, tracked].map(|way| way.errors[0].rmse)
@@ -214,6 +215,11 @@ mod tests {
         let (mut scene, blob) = trained();
         let [_, filtered, tracked] = errors(&scene, &blob);
         assert!(tracked < 0.66 * filtered && tracked < 0.018, "{tracked} {filtered}");
+        // Scans that take four times as long leave less to a decoder that knows all of the scene.
+        let path = scene.world.path.unwrap();
+        let touches = Touches::new(&scene, Synthesis::new(&scene.world), (path, 1), "dz_mm");
+        let z = &touches.limit(Some(1.0), Some(6)).unwrap().limits()[0];
+        assert!(z.limit + 2.0 * z.limit_standard_error < tracked, "{tracked} {z:?}");
         // Contacts of other forms, which neither has met.
         for other in ["punch", "ellipse", "tail"] {
             let of_name = scene.others.iter().find(|it| it.name.contains(other));

@@ -447,6 +447,9 @@ pub fn impossible(
     for of_readings in points.chunk_by(|a, b| a.shares == b.shares) {
         let point = &of_readings[0];
         let subject = judge::subject_of(&plan, point)?;
+        if subject.moving_scene().is_some() {
+            plan.limit_frames = Some(0); // It takes as long as training.
+        }
         let readings = judge::Readings::new(&plan, point, &subject, &mut limits)?;
         let least = readings.limit.groups.iter().find(|limit| limit.group == asked.group);
         let rmse = least.map_or(0.0, |it| it.limit - CERTAIN * it.limit_standard_error);

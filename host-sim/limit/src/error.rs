@@ -9,9 +9,14 @@ pub enum Refusal {
     /// World without noise, in which nothing limits a decoder but the sensor itself.
     #[error("there is no noise, so there is no posterior to sample")]
     NoNoise,
-    /// Errors on contacts that move.
-    #[error("it is that of single frames, and contacts move while they are read and decoded")]
+    /// Errors on contacts that move, whose limit nobody asked for.
+    #[error(
+        "of contacts that move it takes a second or more a trajectory; ask for it by --limit-frames"
+    )]
     Moving,
+    /// Contacts that move, with something that is not modelled.
+    #[error("of contacts that move, {0} is not modelled")]
+    MovingWith(&'static str),
     /// Motion with more latents than the sampler can handle.
     #[error("{latents} unknowns at once are more than the {most} that the sampler is made for")]
     TooManyLatents {

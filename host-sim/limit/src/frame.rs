@@ -4,6 +4,7 @@
 
 use taxel_data::{LANES, Lanes, ln, widest};
 use taxel_simulate::World;
+use taxel_simulate::motion::Motion;
 use taxel_simulate::outputs::Outputs;
 use taxel_simulate::sensor::{LaneModel, Precision, Scratch};
 
@@ -11,8 +12,9 @@ use crate::target::Target;
 
 /// Rows whose latents are sampled together, with the noise on their readings.
 pub struct Rows<'w> {
-    /// World of the frames.
+    /// World of the frames, and how its electrodes move.
     pub world: &'w World,
+    pub motion: &'w dyn Motion,
     /// Forward model of its sensor.
     pub model: LaneModel<'w>,
     /// Row-wires, from 0.
@@ -41,8 +43,7 @@ impl Rows<'_> {
 
     /// Number of latents.
     pub fn latents(&self) -> usize {
-        let world = self.world;
-        world.motion.latents(self.wires.len() * world.sensor.electrodes_per_row_wire)
+        self.motion.latents(self.wires.len() * self.world.sensor.electrodes_per_row_wire)
     }
 
     /// Number of readings.
@@ -61,7 +62,7 @@ impl Rows<'_> {
         let Memory { deformation_mm, resistance_ohm, scratch } = memory;
         let of_rows = resistance_ohm.chunks_exact_mut(self.world.sensor.column_wires);
         for (&row, resistance_ohm) in self.wires.iter().zip(of_rows) {
-            self.world.motion.place(&self.world.sensor, row, latents, deformation_mm);
+            self.motion.place(&self.world.sensor, row, latents, deformation_mm);
             widest!({
                 self.model.row_column_resistance_ohm(
                     row,
@@ -168,12 +169,12 @@ impl Target for Frame<'_> {
     }
 
     fn outputs(&self, latents: &[Lanes], memory: &mut Memory, outputs: &mut [Lanes]) {
-        let Rows { world, wires, .. } = self.rows;
+        let Rows { world, motion, wires, .. } = self.rows;
         let sensor = &world.sensor;
         let wanted = match &world.outputs {
             Outputs::Electrodes(wanted) => wanted,
             Outputs::Contact(wanted) => {
-                let contact = world.motion.place_contact(sensor, latents);
+                let contact = motion.place_contact(sensor, latents);
                 let columns = wanted.iter().flat_map(|it| it.of(contact.as_ref(), sensor));
                 outputs.iter_mut().zip(columns).for_each(|(output, lanes)| *output = lanes);
                 return;
@@ -183,7 +184,7 @@ impl Target for Frame<'_> {
         let factors: Vec<(usize, f64)> = factors.collect();
         let of_rows = outputs.chunks_exact_mut(sensor.electrodes_per_row_wire * factors.len());
         for (&row, outputs) in wires.iter().zip(of_rows) {
-            world.motion.place(sensor, row, latents, &mut memory.deformation_mm);
+            motion.place(sensor, row, latents, &mut memory.deformation_mm);
             let electrodes = outputs.chunks_exact_mut(factors.len());
             for (delta, outputs) in memory.deformation_mm.iter().zip(electrodes) {
                 for ((axis, factor), output) in factors.iter().zip(outputs) {
@@ -204,6 +205,7 @@ mod tests {
         let world = World { read_rows: vec![3], ..World::press() };
         let rows = |deviation_ohm| Rows {
             world: &world,
+            motion: &*world.motion,
             model: LaneModel::new(&world.sensor),
             wires: &[3],
             deviation_ohm,

@@ -17,6 +17,7 @@ mod maps;
 mod population;
 mod frame;
 pub mod limit;
+pub mod moving;
 pub mod reference;
 pub mod identify;
 

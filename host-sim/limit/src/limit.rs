@@ -131,6 +131,7 @@ impl Limit {
     fn rows<'l>(&'l self, group: &'l Group) -> Vec<Rows<'l>> {
         let of_kind = |(_, world): &'l (f64, World)| Rows {
             world,
+            motion: &*world.motion,
             model: LaneModel::new(&world.sensor),
             wires: &group.rows,
             deviation_ohm: &group.deviation_ohm,
@@ -173,7 +174,7 @@ impl Limit {
 /// Samples of the prior of `rows`, with their ideal readings, for a motion with this share.
 fn prior(world: &World, share: f64, rows: &[usize]) -> Prior {
     let model = LaneModel::new(&world.sensor);
-    let rows = Rows { world, model, wires: rows, deviation_ohm: &[] };
+    let rows = Rows { world, motion: &*world.motion, model, wires: rows, deviation_ohm: &[] };
     let n = rows.latents();
     let part = rows.wires.first().map_or(0, |row| *row as u64 + 1);
     let draw = |memory: &mut Memory, number: usize| {

@@ -134,12 +134,12 @@ fn populate<T: Target>(
 }
 
 /// Weights of all samples, those of one kind after those of another.
-fn weights(kinds: &[Samples]) -> Vec<f64> {
+pub fn weights(kinds: &[Samples]) -> Vec<f64> {
     normalised(&kinds.iter().flat_map(Samples::log_weights).collect::<Vec<_>>())
 }
 
 /// Samples of the prior near which tops of the posterior are looked for.
-fn starts(prior: &Samples, effort: &Effort, random: &mut Random) -> Vec<DVector<f64>> {
+pub fn starts(prior: &Samples, effort: &Effort, random: &mut Random) -> Vec<DVector<f64>> {
     let power = largest_power(&prior.log_prior, &prior.log_likelihood, effort.fitted);
     let weights = normalised(&tempered(&prior.log_prior, &prior.log_likelihood, power));
     let mut numbers = resampled(&weights, STARTS, random);

@@ -2,13 +2,17 @@
 
 use serde::{Deserialize, Serialize};
 use taxel_data::{Progress, Stream, Table, columns};
+use taxel_simulate::outputs::Outputs;
+use taxel_simulate::timetable::Timetable;
 use taxel_simulate::{Synthesis, World};
 
 use crate::error::Refusal;
 use crate::limit::{Limit, Posterior};
+use crate::moving;
 
-/// Least effective sample size of a posterior that counts as sampled.
+/// Least effective sample size of a posterior that counts as sampled: of a still frame, and of a contact that moves.
 const LEAST_EFFECTIVE: f64 = 100.0;
+const LEAST_OF_MOVING: f64 = 10.0;
 /// Largest share of the posterior means' squared error that may be their own Monte Carlo error. It is subtracted;
 /// a share this large would move the RMSE by 1.5 %.
 const MOST_MONTE_CARLO: f64 = 0.03;
@@ -95,7 +99,42 @@ impl Reference {
         let squares = drawn.squared_errors(&drawn.means().repeat(PRIOR_FRAMES));
         let prior_variance = squares.iter().map(|sum| sum / PRIOR_FRAMES as f64).collect();
         let reference = Self { truth: frames.outputs, posteriors, prior_variance, apart };
-        reference.check()?;
+        reference.check(LEAST_EFFECTIVE)?;
+        Ok(reference)
+    }
+
+    /// Samples the posteriors of a world whose contacts move: at each of `moments_s` that of a trajectory of its own, given
+    /// those of its scans by the `timetable` that are finished by then, `finished_s` after they start. The posterior mean
+    /// itself takes no time.
+    ///
+    /// # Errors
+    /// As [`new`](Self::new).
+    ///
+    /// # Panics
+    /// If no scan is finished at some moment.
+    pub fn moving(
+        world: &World,
+        scans: (&Timetable, f64),
+        moments_s: &[f64],
+    ) -> Result<Self, Refusal> {
+        let refused = [
+            (world.motion.latents(0) == 0, "a mix of contacts"),
+            (matches!(world.outputs, Outputs::Contact(_)), "an output of the contact itself"),
+            (world.noise.is_none(), "a sensor without noise"),
+            (world.noise.correlated_level > 0.0, "noise with a memory"),
+            (world.rubber.at_rest(0).is_some(), "rubber with a memory"),
+            (world.drift.is_some(), "a drift of the gain"),
+        ];
+        if let Some((_, what)) = refused.into_iter().find(|(is_there, _)| *is_there) {
+            return Err(Refusal::MovingWith(what));
+        }
+        let path = world.path.as_ref().ok_or(Refusal::MovingWith("one that does not"))?;
+        let (values, posteriors) = moving::posteriors((world, path), scans, moments_s);
+        let truth = Table { names: world.output_names(), values };
+        let squares = truth.squared_errors(&truth.means().repeat(moments_s.len()));
+        let prior_variance = squares.iter().map(|sum| sum / moments_s.len() as f64).collect();
+        let reference = Self { truth, posteriors, prior_variance, apart: 1 };
+        reference.check(LEAST_OF_MOVING)?;
         Ok(reference)
     }
 
@@ -211,9 +250,9 @@ impl Reference {
     }
 
     /// Checks that the sample carries the figures.
-    fn check(&self) -> Result<(), Refusal> {
+    fn check(&self, least: f64) -> Result<(), Refusal> {
         let is_thin = |posterior: &Posterior| {
-            posterior.effective.iter().any(|size| size.is_nan() || *size < LEAST_EFFECTIVE)
+            posterior.effective.iter().any(|size| size.is_nan() || *size < least)
         };
         let numbered = self.posteriors.iter().zip(1..);
         let frames: Vec<usize> = numbered
@@ -221,7 +260,7 @@ impl Reference {
             .map(|(_, number)| number)
             .collect();
         if !frames.is_empty() {
-            return Err(Refusal::Thin { frames, of: self.frames(), least: LEAST_EFFECTIVE });
+            return Err(Refusal::Thin { frames, of: self.frames(), least });
         }
         for (group, members) in columns::groups(&self.truth.names) {
             let limit = self.limit(group, &members);
@@ -288,7 +327,7 @@ mod tests {
     #[test]
     fn the_ratio_is_that_of_the_errors() {
         let reference = reference(1e6, 0.2, 3.0);
-        assert_eq!(reference.check(), Ok(()));
+        assert_eq!(reference.check(100.0), Ok(()));
         let limit = &reference.limits()[0];
         assert!((limit.limit - 0.2).abs() < 1e-3 && (limit.rmse - 0.2).abs() < 1e-3);
         // A decoder that is 0.15 mm off the posterior mean, on whichever side: √(0.04 + 0.0225)/0.2.
@@ -318,13 +357,13 @@ mod tests {
 
     #[test]
     fn a_sample_that_does_not_carry_the_figures_is_refused() {
-        let refusal = |effective, off| reference(effective, off, 3.0).check().unwrap_err();
+        let refusal = |effective, off| reference(effective, off, 3.0).check(100.0).unwrap_err();
         assert!(matches!(refusal(99.0, 0.2), Refusal::Thin { of: 100, .. }));
         assert!(matches!(refusal(f64::NAN, 0.2), Refusal::Thin { of: 100, .. }));
         assert!(matches!(refusal(1e6, 0.3), Refusal::Inconsistent { .. }));
         assert!(matches!(refusal(1e6, 0.1), Refusal::Inconsistent { .. }));
         // Errors that are rare and large: none is among the frames.
-        assert_eq!(reference(1e6, 0.1, 1e4).check(), Ok(()));
+        assert_eq!(reference(1e6, 0.1, 1e4).check(100.0), Ok(()));
     }
 
     /// Two outputs of two frames, whose figures are worked out by hand.

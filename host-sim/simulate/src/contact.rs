@@ -76,7 +76,7 @@ impl Contact {
     }
 
     /// Writes the deformations in mm of electrodes at rest at `electrodes_mm`, by electrode and axis.
-    pub(crate) fn deform(&self, electrodes_mm: &[Vector3], deformation_mm: &mut [[Lanes; 3]]) {
+    pub fn deform(&self, electrodes_mm: &[Vector3], deformation_mm: &mut [[Lanes; 3]]) {
         let profiles = self.profiles();
         widest!({
             for (delta, electrode_mm) in deformation_mm.iter_mut().zip(electrodes_mm) {

@@ -19,6 +19,9 @@ const PHASE: f64 = 0.5 / TAU;
 const FINE_S: f64 = 0.001;
 const FINE_MM: f64 = 0.1;
 const FINE_PRESS: f64 = 0.01;
+/// Number of numbers that fix a path: speed, press rate, greatest depth, centre along x and y, direction of its half lengths,
+/// phase along x, how far that along y is apart, and phase of the presses.
+pub const NUMBERS: usize = 9;
 /// Most trajectories.
 const MOST_TRAJECTORIES: usize = 10_000;
 
@@ -146,8 +149,15 @@ impl Path {
         self.half_length_mm.unwrap_or([lengths(0), lengths(1)])
     }
 
-    /// Draws the paths of [`LANES`] trajectories over `sensor`, for contacts up to `deepest_mm`.
-    pub(crate) fn start(&self, sensor: &Sensor, deepest_mm: f64, draws: &mut Draws) -> Paths {
+    /// Draws the numbers on [0, 1) that fix the paths of [`LANES`] trajectories.
+    pub fn draw(draws: &mut Draws) -> [Lanes; NUMBERS] {
+        let mut drawn = [[0.0; LANES]; NUMBERS];
+        widest!(draws.of(Purpose::Path, 0).between([[0.0, 1.0]; NUMBERS], &mut drawn));
+        drawn
+    }
+
+    /// Paths that these numbers on [0, 1) fix, over `sensor`, for contacts up to `deepest_mm`.
+    pub fn place(&self, sensor: &Sensor, deepest_mm: f64, units: &[Lanes; NUMBERS]) -> Paths {
         let [centre_x, centre_y] = self.centre_mm(sensor);
         let [half_x, half_y] = self.half_length_mm(sensor);
         let (turn, phase) = ([0.0, 1.0], [-PHASE, PHASE]);
@@ -162,10 +172,12 @@ impl Path {
             phase,
             turn,
         ];
-        let mut drawn = [[0.0; LANES]; 9];
-        widest!(draws.of(Purpose::Path, 0).between(ranges, &mut drawn));
+        let mut numbers = *units;
+        for (lanes, [low, high]) in numbers.iter_mut().zip(ranges) {
+            lanes.iter_mut().for_each(|number| *number = low + (high - low) * *number);
+        }
         let [speed, rate, depth_mm, x_mm, y_mm, direction, phase_x, phase_apart, phase_press] =
-            drawn;
+            numbers;
         let mut paths = Paths {
             centre_mm: [x_mm, y_mm],
             half_length_mm: [[0.0; LANES]; 2],
@@ -190,8 +202,9 @@ impl Path {
     }
 }
 
-/// Paths that have been drawn, one a lane.
-pub(crate) struct Paths {
+/// Paths, one a lane.
+#[derive(Debug)]
+pub struct Paths {
     centre_mm: [Lanes; 2],
     half_length_mm: [Lanes; 2],
     turns_per_s: Lanes,
@@ -211,7 +224,7 @@ fn sine_of_turns(turns: f64) -> f64 {
 
 impl Paths {
     /// Centre and depth of the contact in mm at this time.
-    pub(crate) fn at(&self, time_s: f64) -> ([Lanes; 2], Lanes) {
+    pub fn at(&self, time_s: f64) -> ([Lanes; 2], Lanes) {
         let (mut centre_mm, mut depth_mm) = (self.centre_mm, self.depth_mm);
         widest!({
             for (axis, centre_mm) in centre_mm.iter_mut().enumerate() {
@@ -239,7 +252,7 @@ mod tests {
     fn paths(path: &Path) -> Paths {
         let sensor = Sensor::paper();
         path.check(&sensor, 1.0).unwrap();
-        path.start(&sensor, 1.0, &mut Draws::new(1, Stream::Test, 0))
+        path.place(&sensor, 1.0, &Path::draw(&mut Draws::new(1, Stream::Test, 0)))
     }
 
     #[test]

@@ -118,6 +118,7 @@ fn check(training: &TrainingOptions) -> Result<()> {
 fn wanted(arguments: &Arguments, common: &Common) -> Result<Wanted> {
     let whole = |value: usize| Value::Integer(i64::try_from(value).unwrap_or(i64::MAX));
     let mut wanted = Wanted { train: !arguments.limit_only, ..Wanted::default() };
+    wanted.limit_frames = arguments.tried.limit.frames();
     wanted.set = fields_of(&arguments.training)?;
     wanted.set.remove("training.centres");
     let centres = arguments.training.centres.as_deref().unwrap_or_default();

@@ -2,7 +2,7 @@
 
 use crate::Error;
 use crate::device::Readout;
-use clap::{Args, ValueEnum};
+use clap::{Args, ValueEnum, value_parser};
 use taxel_data::BadValue;
 
 use super::arguments::of_option;
@@ -24,6 +24,24 @@ pub struct DecoderArguments {
     /// [default: the last of a scene, all of a data file].
     #[arg(long, value_name = "GROUP")]
     pub group: Option<String>,
+    #[command(flatten)]
+    pub limit: LimitArgument,
+}
+
+/// Frames of a scene on which the least possible error is computed.
+#[derive(Args, Default)]
+pub struct LimitArgument {
+    /// Test frames on which the least possible error is computed; of contacts that move, trajectories, which take a second or more
+    /// each [default: as many as suffice, and none of contacts that move].
+    #[arg(long, value_name = "N", value_parser = value_parser!(u16).range(2..))]
+    pub limit_frames: Option<u16>,
+}
+
+impl LimitArgument {
+    /// Number of frames, if it is given.
+    pub fn frames(&self) -> Option<usize> {
+        self.limit_frames.map(usize::from)
+    }
 }
 
 /// Time of a scan, of which the board's own is known.
@@ -42,6 +60,7 @@ pub fn of_field(bad: BadValue) -> Error {
             let option = format!("--{}", field.replace('_', "-"));
             bad.named(&option)
         }
+        None if bad.field == "limit_frames" => bad.named("--limit-frames"),
         None => bad,
     })
 }

@@ -12,6 +12,7 @@ use taxel_data::output::FileSet;
 use taxel_evaluate::table1;
 use taxel_learn::ModelBlob;
 
+use super::decoder_arguments::LimitArgument;
 use super::format_note::note_format;
 use super::subject_argument::SubjectArgument;
 use super::{Common, arguments, command_line, print, refused_readings};
@@ -48,6 +49,8 @@ pub struct Arguments {
     #[command(flatten)]
     to: arguments::OutputFolder,
     #[command(flatten)]
+    limit: LimitArgument,
+    #[command(flatten)]
     subject: SubjectArgument,
 }
 
@@ -59,7 +62,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<print::Outcome>
     refused_readings::note_scene(&subject, common);
     let started = std::time::Instant::now();
     let progress = Terminal::new(common);
-    let outcome = run::run(&subject, &options, &progress);
+    let outcome = run::run(&subject, &options, arguments.limit.frames(), &progress);
     let (mut result, blob) =
         outcome.map_err(|error| arguments::blamed(error, arguments.subject.training()))?;
     if let Some(scene) = subject.scene().filter(|scene| scene.table1.is_some()) {

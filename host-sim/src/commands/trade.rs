@@ -100,6 +100,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<print::Outcome>
         return Err(Error::Usage(message.into()));
     }
     let mut wanted = asked.wanted(&subject);
+    wanted.limit_frames = arguments.tried.limit.frames();
     for (field, value) in arguments.subject.set(&subject, common)? {
         // A spread that is set would follow the kind of networks, which is an axis.
         if field == "training.spread" || wanted.axes.contains_key(&field) {

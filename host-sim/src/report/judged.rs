@@ -327,7 +327,8 @@ fn moving_contacts(sections: &mut Sections, moving: Option<&MovingContacts>) {
     let rows: Vec<Row<'_>> = ways.chain(baselines).collect();
     let caption = format!(
         "RMSE and R² as a robot meets them, on {}: the newest finished estimate against the truth at that moment, every ms, \
-         read by the board. Age: mean time from the middle of a scan until its estimate is used.",
+         read by the board. Age: mean time from the middle of a scan until its estimate is used. × limit: to the least possible \
+         RMSE, from all scans that are finished by then, in no time.",
         moving.path.in_words()
     );
     let filter = |row: &Row<'_>| row.1.and_then(|way| way.filter);
@@ -338,12 +339,22 @@ fn moving_contacts(sections: &mut Sections, moving: Option<&MovingContacts>) {
         .values("frames_per_s", |row| number_value(row.1.map(|way| way.times.frames_per_s)))
         .numbers("age_ms", "age", "ms", Digits::Decimals(2), |row| row.1?.times.age_ms);
     for Errors { group, unit, .. } in rows.first().map_or(&[][..], |(.., errors)| errors) {
-        let [rmse, r2] = ["rmse", "r_squared"].map(|name| format!("{name}_{group}"));
+        let [rmse, r2, ratio, error] =
+            ["rmse", "r_squared", "ratio_to_limit", "ratio_standard_error"]
+                .map(|name| format!("{name}_{group}"));
+        let ratio = [ratio.as_str(), &error];
         table = table
             .numbers(&rmse, &symbol(group), unit, RMSE, |(.., errors)| rmse_of(errors, group))
-            .numbers(&r2, "R²", "", Digits::Decimals(3), |(.., errors)| r_squared(errors, group));
+            .numbers(&r2, "R²", "", Digits::Decimals(3), |(.., errors)| r_squared(errors, group))
+            .estimates(ratio, "× limit", "", Digits::Decimals(2), |(.., errors)| {
+                let of_group = errors.iter().find(|it| it.group == *group)?;
+                Some([of_group.ratio_to_limit?, of_group.ratio_standard_error?])
+            });
     }
     sections.table_as("moving", table);
+    let groups = names(&moving.ways[0].errors);
+    sections.note(named(&moving.limit.note(), groups));
+    sections.value("moving_limit", &moving.limit);
     for filter in moving.ways.iter().filter_map(|way| way.filter) {
         sections.note(format!(
             "The filter on a device: `taxel link PORT configure --filter-ms {} --lead-ms {}` (docs/filter.md).",

@@ -35,7 +35,7 @@ fn result() -> RunResult {
         (scene.frames, scene.test_frames) = (600, 20);
         (scene.training.options.centres, scene.training.refine) = (9, false);
         let options = scene.options();
-        run(&Subject::Scene(scene.into()), &options, &Silent).unwrap().0
+        run(&Subject::Scene(scene.into()), &options, None, &Silent).unwrap().0
     });
     let mut result = run.clone();
     let entry = |decoder: &str, spread: Option<f64>, rmse: f64| {

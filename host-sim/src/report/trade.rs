@@ -282,9 +282,10 @@ fn front(sections: &mut Sections, trade: &Trade, all: bool) {
     } else {
         ""
     };
+    let in_no_time = trade.motion.map_or("", |_| ", computed in no time");
     let caption = format!(
         "{which}. Array: one network for all rows, behind a projection. Samples: averaged for a reading. RMSE: ± its standard \
-         error. × limit: to the least possible RMSE with as many samples and the same columns.{of_worst}"
+         error. × limit: to the least possible RMSE with as many samples and the same columns{in_no_time}.{of_worst}"
     );
     let keys = |name: &str| [format!("{name}_{group}"), format!("{name}_standard_error_{group}")];
     let ([rmse, rmse_error], [ratio, ratio_error]) = (keys("rmse"), keys("ratio_to_limit"));

@@ -47,7 +47,7 @@ const COMMANDS: [&str; 99] = [
     "limit spans.toml --noise 0.01,0.03 -n 4 -o spans",
     "trade scene.toml --centres 4,6 --average 1,4 --column-step 1,3 --frame-rate 50 --all -o rates",
     "trade tiny.toml --centres 4 --readout onchip --average 1,4 --max-latency-ms 9 --clock-mhz 90 --worst-case -o slow",
-    "trade moving.toml --centres 4 --max-error 1 --scan-ms 3 -o moving-trade",
+    "trade moving.toml --centres 4 --max-error 1 --scan-ms 3 --limit-frames 2 -o moving-trade",
     "trade tiny.toml --centres 4,12 --max-flash 6000 --all -o small",
     "synth spans_drift.toml -n 20 -o spans.csv",
     "sweep all.toml",

@@ -9,7 +9,7 @@ use taxel_simulate::path::Path;
 use crate::device::{Device, Times, Wires};
 use crate::error::Result;
 use crate::experiment::Experiment;
-use crate::metrics::{DecoderErrors, Errors};
+use crate::metrics::{DecoderErrors, Errors, LimitSummary, Measure};
 use crate::touches::{Touched, Touches, Way};
 use crate::trade::FilterSettings;
 
@@ -23,6 +23,8 @@ pub struct MovingContacts {
     pub ways: Vec<MovingWay>,
     /// Errors of the baselines, whose decoding takes no time.
     pub decoders: Vec<DecoderErrors>,
+    /// Limit of contacts that move, if it is asked for.
+    pub limit: LimitSummary,
     /// Trajectory to look at.
     pub shown: ShownTrajectory,
 }
@@ -50,12 +52,13 @@ pub struct ShownTrajectory {
 }
 
 impl MovingContacts {
-    /// Errors of the model in `blob` on the moving contacts of `scene`, beside those of the `baselines`; `None` if its contacts
-    /// do not move.
+    /// Errors of the model in `blob` on the moving contacts of `scene`, beside those of the `baselines`, and the limit on so many
+    /// trajectories if it is asked for; `None` if its contacts do not move.
     pub fn new(
         scene: &Experiment,
         blob: &ModelBlob,
         baselines: &[Box<dyn Decoder>],
+        limit_frames: Option<usize>,
     ) -> Result<Option<Self>> {
         let Some(path) = scene.world.path else { return Ok(None) };
         let device = Device::default();
@@ -66,8 +69,10 @@ impl MovingContacts {
         let touches = Touches::new(scene, synthesis, (path, device.passes(1)), group);
         let model = blob.prepare().of_inputs();
         let cost = Cost::of_frame(&Design::new(blob));
-        let touched = touches.judge((blob, &model), cost, (&device, scan_ms), &scene.measure())?;
-        let measure = scene.measure();
+        let limit = touches.limit(scan_ms, limit_frames);
+        let summary = LimitSummary::new(&limit);
+        let measure = Measure { limit: limit.ok(), ..scene.measure() };
+        let touched = touches.judge((blob, &model), cost, (&device, scan_ms), &measure)?;
         let decoders =
             baselines.iter().map(|it| touches.judge_at_once(it.as_ref(), scan_ms, &measure));
         let way = |way: &Way| MovingWay {
@@ -81,6 +86,7 @@ impl MovingContacts {
             group: group.into(),
             ways: touched.ways.iter().map(way).collect(),
             decoders: decoders.collect::<Result<_>>()?,
+            limit: summary,
             shown: ShownTrajectory::new(&touched, group),
         }))
     }

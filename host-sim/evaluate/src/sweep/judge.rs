@@ -187,13 +187,17 @@ pub fn subject_of(plan: &Plan, point: &Point) -> Result<Subject> {
 pub struct KnownLimit(Option<(World, usize, std::result::Result<Reference, Refusal>)>);
 
 impl KnownLimit {
-    /// Limit on the first `frames` test frames of a world.
-    fn of(&mut self, world: &World, frames: usize) -> std::result::Result<Reference, Refusal> {
+    /// Limit on the first `frames` test frames of a world, or of its contacts that move as `moving` computes it.
+    fn of(
+        &mut self,
+        (world, frames): (&World, usize),
+        moving: impl FnOnce() -> std::result::Result<Reference, Refusal>,
+    ) -> std::result::Result<Reference, Refusal> {
         match &self.0 {
             Some((known, of, limit)) if known == world && *of == frames => limit.clone(),
             _ => {
                 let limit = match world.path {
-                    Some(_) => Err(Refusal::Moving),
+                    Some(_) => moving(),
                     None => Reference::new(world, frames, &Silent),
                 };
                 self.0 = Some((world.clone(), frames, limit.clone()));
@@ -241,7 +245,13 @@ impl<'s> Readings<'s> {
                 .limit_frames
                 .unwrap_or_else(|| Reference::few_frames(&scene.world).min(scene.test_frames));
             if frames > 0 {
-                let found = limits.of(&scene.world, frames);
+                let found = limits.of((&scene.world, frames), || {
+                    let (scene, path) = subject.moving_scene().ok_or(Refusal::Moving)?;
+                    let passes = point.on_device.device.passes(point.on_device.samples);
+                    let synthesis = Synthesis::new(&scene.world);
+                    let touches = Touches::new(scene, synthesis, (path, passes), metrics::ALL);
+                    touches.limit(scan_ms, plan.limit_frames)
+                });
                 limit = LimitSummary::new(&found);
                 match found {
                     Ok(found) => measure.limit = Some(found),

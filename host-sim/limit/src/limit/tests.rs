@@ -3,11 +3,12 @@
 use nalgebra::DMatrix;
 use taxel_learn::Decoder;
 use taxel_simulate::motion::{Dent, Kind, Mix, Part};
-use taxel_simulate::noise::NoiseKind;
+use taxel_simulate::noise::{Noise, NoiseKind};
 use taxel_simulate::outputs::{ContactOutput, Outputs};
 use taxel_simulate::path::Path;
 use taxel_simulate::profile::Profile;
 use taxel_simulate::rubber::StandardLinearSolid;
+use taxel_simulate::timetable::Timetable;
 use taxel_simulate::{drift::Drift, synthesise};
 
 use super::*;
@@ -158,6 +159,7 @@ fn latents_have_the_distribution_that_frames_are_drawn_from() {
         let prior = prior(&world, 1.0, &[1]);
         let rows = Rows {
             world: &world,
+            motion: &*world.motion,
             model: LaneModel::new(&world.sensor),
             wires: &[1],
             deviation_ohm: &[],
@@ -215,4 +217,52 @@ fn noise_of_a_span_is_that_of_each_row() {
     let found: Vec<f64> = limit.groups.iter().flat_map(|it| it.deviation_ohm.clone()).collect();
     assert!(limit.groups.len() > 1);
     assert_eq!(found, expected);
+}
+
+/// A contact that is held where it is tells as much in n frames of the noise √n·p as in one of the noise p.
+#[test]
+fn the_limit_of_a_contact_that_does_not_move_is_that_of_a_still_one() {
+    let mut world = World { read_rows: vec![3, 4], ..World::press() };
+    let still = Reference::new(&world, 200, &Silent).unwrap().limits();
+    world.path = Some(Path {
+        peak_depth_mm: Some([0.0, 1.0]),
+        centre_mm: Some([[0.0, 20.0], [0.0, 18.0]]),
+        half_length_mm: Some([[0.0; 2]; 2]),
+        ..Path::at(0.0, 0.0)
+    });
+    world.noise.level *= 3.0;
+    let timetable = Timetable::every(0.01, 0.01, 0.1).unwrap();
+    // Scans are finished at 10 ms, 20 ms, …; nine of them at each moment.
+    let moments_s: Vec<f64> = (0..48).map(|it| 0.09 + 2e-4 * f64::from(it)).collect();
+    let moving = Reference::moving(&world, (&timetable, 0.01), &moments_s).unwrap();
+    for (still, moving) in still.iter().zip(moving.limits()) {
+        let error = still.limit_standard_error.hypot(moving.limit_standard_error);
+        assert!((still.limit - moving.limit).abs() < 2.5 * error, "{still:?} {moving:?}");
+        assert!(moving.limit_standard_error < 0.2 * moving.limit, "{moving:?}");
+    }
+}
+
+#[test]
+fn what_is_not_modelled_of_contacts_that_move_is_refused() {
+    let world = World { path: Some(Path::at(50.0, 3.0)), ..World::press() };
+    let refused = |world: World| {
+        let timetable = Timetable::instants(vec![0.0]);
+        let refused = Reference::moving(&world, (&timetable, 0.0), &[0.1; 2]);
+        refused.unwrap_err().to_string()
+    };
+    let memory = Noise { correlated_level: 0.01, time_constant_ms: 20.0, ..world.noise };
+    let solid = StandardLinearSolid { instant_share: 0.5, time_constant_ms: 100.0 };
+    for (world, what) in [
+        (World { noise: memory, ..world.clone() }, "noise with a memory"),
+        (World { rubber: solid.into(), ..world.clone() }, "rubber with a memory"),
+        (World { noise: Noise::white(NoiseKind::Relative, 0.0), ..world.clone() }, "without noise"),
+        (
+            World { outputs: Outputs::Contact(vec![ContactOutput::Depth]), ..world.clone() },
+            "output",
+        ),
+        (World { motion: Mix { parts: vec![] }.into(), ..world.clone() }, "a mix"),
+        (World { drift: Some(Drift { gain: 0.1 }), ..world }, "a drift"),
+    ] {
+        assert!(refused(world).contains(what), "{what}");
+    }
 }

@@ -8,6 +8,7 @@ use super::Synthesis;
 use crate::contact::Contact;
 use crate::motion::{Draws, Trajectories};
 use crate::outputs::{ContactOutput, ElectrodeOutputs, Outputs, Quantity};
+use crate::path::Path;
 use crate::rubber::Response;
 use crate::sensor::{LaneModel, Precision, Scratch};
 
@@ -129,7 +130,7 @@ impl<'s> LaneSynthesis<'s> {
         workspace.gain = self.synthesis.drift.map(|drift| drift.factors(&mut draws));
         let mut trajectories = motion.start(&world.sensor, &mut draws);
         let deepest_mm = motion.deepest_mm();
-        let paths = path.map(|path| path.start(&world.sensor, deepest_mm, &mut draws));
+        let paths = path.map(|path| path.place(&world.sensor, deepest_mm, &Path::draw(&mut draws)));
         let electrodes = world.sensor.electrodes_per_row_wire;
         let move_to = |trajectories: &mut dyn Trajectories, time_s: f64| {
             if let Some(paths) = &paths {
