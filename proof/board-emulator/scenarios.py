@@ -505,6 +505,54 @@ def stream(make, files):
     bench.finish(erased=[JOURNAL[1], SLOT_B])
 
 
+def events(make, files):
+    """A contact lands and lifts, while a model tracks it: a pin tells both within 5 ms."""
+    bench, model, table = make(), files.directory / "tracked.bin", files.directory / "contacts.csv"
+    bench.run_for(0.02)
+    bench.program("train", "moving", "--track", "--no-refine", "-o", model)
+    bench.program("synth", "press", "-n", 400, "--noise", 0, "-o", table)
+    with table.open() as file:
+        lines = [[float(line[f"r{row}c{column}_ohm"]) for row in range(1, 9) for column in range(1, 19)]
+                 for line in csv.DictReader(file)]
+    # Some contact is far from each cell: it is at rest.
+    rest = [max(line[cell] for line in lines) for cell in range(8 * 18)]
+    contact = min(lines, key=lambda line: min(ohm / rest[cell] for cell, ohm in enumerate(line)))
+
+    def show(ohms):
+        for row in range(8):
+            bench.ohm[row][:] = ohms[18 * row:][:18]
+
+    show(rest)
+    bench.taxel("upload", model)
+    # The line carries no estimate a millisecond.
+    bench.taxel("configure", "--period-us", 1000, "--oversampling", 12, "--report-every", 50)
+    bench.ask(CAPTURE + varint(20), BASELINE)
+    board, starts, edges = bench.board, [], []
+    port, touch = board.ports["C"], 8
+    was = [port.high(touch)]
+
+    def changed():
+        if port.high(touch) != was[-1]:
+            was.append(port.high(touch))
+            edges.append(board.time.now)
+
+    port.changed, board.passes.on_start = changed, starts.append
+    for ohms in (contact, rest) * 4:
+        bench.run_for(20.3e-3)
+        changed_at, known = board.time.now, len(edges)
+        show(ohms)
+        bench.run_for(6e-3)
+        expect(len(edges) == known + 1, f"{len(edges) - known} edges of the pin, not one")
+        start = min(start for start in starts if start >= changed_at)
+        cycles = edges[-1] - start
+        board.note(f"{'contact' if was[-1] else 'rest'}: the pin tells it {board.time.ns(edges[-1] - changed_at) / 1e3:.0f} us "
+                   f"later, {cycles} cycles or {board.time.ns(cycles) / 1e3:.0f} us behind the start of the next scan")
+        expect(board.time.ns(cycles) < 5e6, "the pin is late")
+    statistics = ask_statistics(bench)
+    board.note(f"decoding and tracking: {statistics['longest_decode_us']} us at most")
+    bench.finish(erased=[JOURNAL[1], SLOT_B])
+
+
 class Stamped(bytearray):
     """Bytes of a line, with the time in us by `clock()` at which each packet ended."""
 
@@ -546,5 +594,5 @@ SCENARIOS = {
     scenario.__name__.replace("_", "-"): scenario
     for scenario in (session, sparse, wide, slow_erase, slow_erase_bare, patience, silent_sensor, silent_sensor_slow,
                      no_clock, clock_stops, fault_restarts, panic_restarts, brown_out, sagging_supply, keep, burst, overrun,
-                     log_abandoned, restart, dead_host, scans, shorts, stream)
+                     log_abandoned, restart, dead_host, scans, shorts, stream, events)
 }

@@ -107,7 +107,7 @@ impl<'m, F: FrameSource, const ROWS: usize> Sensor<'m, F, ROWS> {
     /// Replaces the frame with the `readings_ohm` of a request.
     pub fn set_frame(&mut self, readings_ohm: Floats<'_>) -> Result<(), Refusal> {
         self.check_length(readings_ohm)?;
-        let frame = self.frame.get_mut(..self.wiring.readings).unwrap_or_default();
+        let frame = self.frame_mut();
         frame.iter_mut().zip(readings_ohm.iter()).for_each(|(place, reading)| *place = reading);
         Ok(())
     }
@@ -122,15 +122,19 @@ impl<'m, F: FrameSource, const ROWS: usize> Sensor<'m, F, ROWS> {
         }
     }
 
-    /// Looks for faulty readings. Returns the frame, in which they are NaN, and what was found.
-    pub fn judge_frame(&mut self) -> (&mut [f32], Health) {
+    /// The readings of the last frame, to be filled.
+    pub fn frame_mut(&mut self) -> &mut [f32] {
+        self.frame.get_mut(..self.wiring.readings).unwrap_or_default()
+    }
+
+    /// Looks for faulty readings, which are NaN then.
+    pub fn judge_frame(&mut self) -> Health {
         let limits = Limits {
             shorted_below_ohm: self.configuration.shorted_below_ohm,
             open_above_ohm: self.configuration.open_above_ohm,
         };
         let frame = self.frame.get_mut(..self.wiring.readings).unwrap_or_default();
-        let health = Health::new(frame, self.wiring.line, limits, &mut self.faulty_columns);
-        (frame, health)
+        Health::new(frame, self.wiring.line, limits, &mut self.faulty_columns)
     }
 
     /// Whether the last frame differs from the baseline as under a contact: by the largest relative change, since a device

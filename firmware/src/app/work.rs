@@ -60,9 +60,22 @@ impl<const ROWS: usize> Work<'_, ROWS> {
         model: &InForce<'_, ROWS>,
     ) -> (u8, Health) {
         let (start_us, start_cycles) = now(link);
-        let (frame, health) = sensor.judge_frame();
+        let health = sensor.judge_frame();
         let mut flags = if health.is_good() { 0 } else { EstimateReport::FAULTY_READING };
+        let is_touched = sensor.is_touched(scan.is_some());
+        if scan.is_some() {
+            // A touch need not wait until the frame is decoded.
+            link.platform().signal([
+                is_touched,
+                self.events.is_on(Kind::Load),
+                self.events.is_on(Kind::Slip),
+            ]);
+        }
+        if is_touched {
+            flags |= EstimateReport::CONTACT;
+        }
         if let Some(decoder) = &model.decoder {
+            let frame = sensor.frame_mut();
             if model.tracker.is_some() {
                 self.measured.iter_mut().zip(&*frame).for_each(|(place, ohm)| *place = *ohm);
             }
@@ -122,9 +135,6 @@ impl<const ROWS: usize> Work<'_, ROWS> {
         } else {
             cut(&mut self.estimate, self.rows, 0).status.fill(RowStatus::MissingReading);
             flags |= EstimateReport::NO_MODEL;
-        }
-        if sensor.is_touched(scan.is_some()) {
-            flags |= EstimateReport::CONTACT;
         }
         let (end_us, end_cycles) = now(link);
         let (us, cycles) = (end_us.wrapping_sub(start_us), end_cycles.wrapping_sub(start_cycles));

@@ -30,9 +30,6 @@ const SLIP_MM: f64 = 6.0;
 const TOUCH_DEVIATIONS: f64 = 6.5;
 const SLIP_MM_PER_S: f32 = 2.0;
 
-/// Cycles from a frame's readings to its events.
-const COST: Cost = Cost { instructions: 0, cycles: 160_000 };
-
 /// How a board reads a sensor.
 struct Board<'b> {
     sensor: &'b Sensor,
@@ -208,16 +205,18 @@ fn main() -> Result<()> {
     (scene.training.refine, scene.training.track) = (false, true);
     let blob = scene.train(&taxel_data::Silent)?;
     let model = blob.parse();
+    let tracker = model.tracker().expect("a model that was trained to track");
+    let cost = Cost::of_tracker(tracker.sizes());
     for (readout, samples, load) in [(Readout::OnChip, 12, 0.1), (Readout::Spi, 1, 0.2)] {
         let (device, wires) = (Device { readout, ..Device::default() }, Wires::of(&scene.world));
         let scan_ms = device.scan_ms(Some(wires), samples);
-        let times = device.times(scan_ms, &COST);
+        let times = device.times(scan_ms, &cost);
         let [period_s, scan_s] = [times.period_ms(), scan_ms.unwrap_or(0.0)].map(|ms| 1e-3 * ms);
         let table = Timetable::every(period_s, scan_s, TRIAL_S)?.in_passes(device.passes(samples));
         let board = Board {
             sensor: &scene.world.sensor,
             decoder: Decoder::new(model).expect("a model that was trained"),
-            tracker: model.tracker().expect("a model that was trained to track"),
+            tracker,
             noise: device.averaged(scene.world.noise, Some(wires), samples).level,
             settings: Settings { load, slip_mm_per_s: SLIP_MM_PER_S },
             table,
