@@ -380,6 +380,7 @@ impl Source {
             times_limit: rmse_mm.map(|rmse_mm| rmse_mm / 0.0314),
             position_s: (self.show == "recording").then_some(self.time_s),
             speed: (self.show == "recording").then_some(self.speed),
+            event: None,
         }
     }
 }

@@ -23,6 +23,8 @@ pub struct Frame {
     pub contact_mm: Option<[f32; 3]>,
     /// Force on the sensor along x, y and z in N, if it is known; 0 when a contact ends.
     pub force_n: Option<[f32; 3]>,
+    /// Events of touch that were told since the frame before, in words.
+    pub events: Vec<String>,
     /// State of the wires and of the model. A frame that is written with `None` leaves it as it was: when it is read it
     /// has the last one before it.
     pub status: Option<Status>,

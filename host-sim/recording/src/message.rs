@@ -278,6 +278,18 @@ pub fn read_wrench(bytes: &[u8]) -> Option<[f32; 3]> {
     Some([bytes.f64()? as f32, bytes.f64()? as f32, bytes.f64()? as f32])
 }
 
+/// Text alone.
+pub fn text(text: &str) -> Vec<u8> {
+    let mut message = Message::new();
+    message.text(text);
+    message.into_bytes()
+}
+
+/// Text of a message.
+pub fn read_text(bytes: &[u8]) -> Option<String> {
+    Bytes::message(bytes)?.text().map(String::from)
+}
+
 /// The sensor's frame in its `parent`.
 pub fn transform(ns: u64, parent: &str) -> Vec<u8> {
     let mut message = Message::new();

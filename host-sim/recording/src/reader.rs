@@ -236,6 +236,7 @@ fn add(
         }
         Topic::Contact => frame.contact_mm = Some(message::read_point(data, layout.surface_mm())?),
         Topic::Wrench => frame.force_n = Some(message::read_wrench(data)?),
+        Topic::Events => frame.events.push(message::read_text(data)?),
         Topic::Diagnostics => {
             let mut status = None;
             read_diagnostics(data, &mut status)?;

@@ -10,6 +10,7 @@ pub enum Topic {
     TrueOutputs,
     Contact,
     Wrench,
+    Events,
     Diagnostics,
     Transform,
 }
@@ -20,7 +21,7 @@ pub const ENCODING: &str = "cdr";
 pub const LANGUAGE: &str = "ros2msg";
 
 impl Topic {
-    pub const ALL: [Self; 9] = [
+    pub const ALL: [Self; 10] = [
         Self::Readings,
         Self::Points,
         Self::Truth,
@@ -28,6 +29,7 @@ impl Topic {
         Self::TrueOutputs,
         Self::Contact,
         Self::Wrench,
+        Self::Events,
         Self::Diagnostics,
         Self::Transform,
     ];
@@ -42,6 +44,7 @@ impl Topic {
             Self::TrueOutputs => "/taxel/true_outputs",
             Self::Contact => "/taxel/contact",
             Self::Wrench => "/taxel/wrench",
+            Self::Events => "/taxel/events",
             Self::Diagnostics => "/diagnostics",
             Self::Transform => "/tf_static",
         }
@@ -55,6 +58,7 @@ impl Topic {
             Self::Outputs | Self::TrueOutputs => "std_msgs/msg/Float64MultiArray",
             Self::Contact => "geometry_msgs/msg/PointStamped",
             Self::Wrench => "geometry_msgs/msg/WrenchStamped",
+            Self::Events => "std_msgs/msg/String",
             Self::Diagnostics => "diagnostic_msgs/msg/DiagnosticArray",
             Self::Transform => "tf2_msgs/msg/TFMessage",
         }
@@ -76,6 +80,7 @@ impl Topic {
             Self::Wrench => {
                 "Force in N with the signs of dx dy dz: z is positive for a press. Torque about the origin."
             }
+            Self::Events => "What began or ended: touch, load, slip.",
             Self::Diagnostics => "Faults of wires, frames lost, novel, clamped.",
             Self::Transform => "Place of the sensor.",
         }
@@ -89,6 +94,7 @@ impl Topic {
             Self::Outputs | Self::TrueOutputs => (MULTI_ARRAY, &[ARRAY_LAYOUT, ARRAY_DIMENSION]),
             Self::Contact => (POINT_STAMPED, &[POINT, HEADER, TIME]),
             Self::Wrench => (WRENCH_STAMPED, &[WRENCH, VECTOR, HEADER, TIME]),
+            Self::Events => (STRING, &[]),
             Self::Diagnostics => (DIAGNOSTIC_ARRAY, &[DIAGNOSTIC_STATUS, KEY_VALUE, HEADER, TIME]),
             Self::Transform => {
                 (TF_MESSAGE, &[TRANSFORM_STAMPED, TRANSFORM, VECTOR, QUATERNION, HEADER, TIME])
@@ -144,6 +150,8 @@ const ARRAY_DIMENSION: &str = "std_msgs/MultiArrayDimension
 string label
 uint32 size
 uint32 stride
+";
+const STRING: &str = "string data
 ";
 const POINT_STAMPED: &str = "std_msgs/Header header
 geometry_msgs/Point point

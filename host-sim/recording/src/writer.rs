@@ -139,6 +139,9 @@ impl Writer {
         if let Some(force_n) = frame.force_n {
             put(Topic::Wrench, message::wrench(ns, frame.contact_mm, surface_mm, force_n));
         }
+        for event in &frame.events {
+            put(Topic::Events, message::text(event));
+        }
         if let Some(status) = &frame.status {
             let is_said = self
                 .status

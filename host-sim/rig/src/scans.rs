@@ -29,6 +29,8 @@ pub struct Scan {
     pub readings: Vec<f32>,
     /// What the device made of them, if it sends that.
     pub estimate: Option<ScanEstimate>,
+    /// Events of touch that the device has told since the scan before, in words.
+    pub events: Vec<String>,
 }
 
 /// What a device decoded a scan to.

@@ -42,8 +42,8 @@ impl Moment {
     }
 
     fn of_heard(scan: Scan) -> Self {
-        let Scan { number, start_us, heard, readings, estimate } = scan;
-        let frame = Frame { time_us: start_us, number, readings, ..Frame::default() };
+        let Scan { number, start_us, heard, readings, estimate, events } = scan;
+        let frame = Frame { time_us: start_us, number, readings, events, ..Frame::default() };
         let mut moment = Self { heard, ..Self::new(frame) };
         let Some(estimate) = estimate.filter(|it| it.flags & EstimateReport::NO_MODEL == 0) else {
             return moment;

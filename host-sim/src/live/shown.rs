@@ -100,7 +100,9 @@ mod tests {
             novelty: Some(3.0),
         };
         let (number, start_us, heard) = (7, 9000, Instant::now());
-        let scan = Scan { number, start_us, heard, readings: vec![], estimate: Some(estimate) };
+        let events = vec![];
+        let scan =
+            Scan { number, start_us, heard, readings: vec![], estimate: Some(estimate), events };
         let mut moment = Moment::of_scan(scan.clone(), 3);
         (moment.frame.force_n, moment.frame.contact_mm) =
             (Some([1.0, 2.0, 4.0]), Some([5.0, 6.0, 0.5]));

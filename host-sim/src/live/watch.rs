@@ -82,6 +82,8 @@ struct Watch<'w, 'b> {
     is_touched: bool,
     /// Whether a contact has ended, and no force of 0 was told yet.
     owes_zero: bool,
+    /// Newest event, and when it came.
+    event: Option<(String, Instant)>,
     /// Times of the last frames, whether each was decoded, and squares of errors with their number.
     past: VecDeque<(Instant, bool, f64, usize)>,
     told: Instant,
@@ -108,6 +110,7 @@ impl<'w, 'b> Watch<'w, 'b> {
             touch,
             is_touched: false,
             owes_zero: false,
+            event: None,
             past: VecDeque::new(),
             told: Instant::now(),
         }
@@ -197,6 +200,9 @@ impl<'w, 'b> Watch<'w, 'b> {
         let outputs = frame.outputs.as_deref();
         let (square, count) = shown::errors(self.feed.layout(), outputs, frame.truth.as_deref());
         let has_outputs = outputs.is_some();
+        if let Some(event) = frame.events.last() {
+            self.event = Some((event.clone(), moment.heard));
+        }
         if self.newest.len() == ZERO_FRAMES {
             self.newest.pop_front();
         }
@@ -374,6 +380,9 @@ impl<'w, 'b> Watch<'w, 'b> {
             times_limit: judged.map(|[best, decoded]| (decoded / best).sqrt() as f32),
             position_s,
             speed,
+            event: self.event.as_ref().map(|(words, heard)| {
+                format!("{words}, {:.0} s ago", heard.elapsed().as_secs_f64())
+            }),
         });
     }
 }

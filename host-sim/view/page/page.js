@@ -165,6 +165,7 @@ function showStatus() {
   setText("scan_rate", digits(status.scan_rate, 0));
   setText("decode_rate", digits(status.decode_rate, 0));
   setText("lost", status.lost);
+  setText("event", status.event ?? "");
   byId("lost").style.color = status.lost ? theme.warn : "";
   if (layout) showSize();
   if (!isPaused) {

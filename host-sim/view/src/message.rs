@@ -161,6 +161,8 @@ pub struct Status {
     pub position_s: Option<f64>,
     /// Speed of a recording, 1 for that of the clock.
     pub speed: Option<f64>,
+    /// Newest event of touch and its age, in words.
+    pub event: Option<String>,
 }
 
 /// State of a source.

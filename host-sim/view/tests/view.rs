@@ -230,7 +230,7 @@ fn the_page_is_told_in_the_agreed_json() {
     let expected = [
         r#"{"title":"</script><script>alert(1)</script>\n","kind":"device","source":"","rows":0,"columns":0,"readings":[{"name":"r1c1","unit":"Ω"}],"outputs":[{"name":"r1e1_dz","unit":"mm"}],"electrodes":[],"scale_mm":0.0,"can":{"zero":false,"record":false,"seek":false},"duration_s":null}"#,
         "[100.0,null]",
-        r#"{"state":"live","message":"all is well","scan_rate":null,"decode_rate":null,"rest":"","lost":0,"wires":[],"recording":null,"rmse_mm":null,"times_limit":null,"position_s":null,"speed":null}"#,
+        r#"{"state":"live","message":"all is well","scan_rate":null,"decode_rate":null,"rest":"","lost":0,"wires":[],"recording":null,"rmse_mm":null,"times_limit":null,"position_s":null,"speed":null,"event":null}"#,
     ];
     assert_eq!(data[..3], expected);
     let frame: serde_json::Value = serde_json::from_str(data[3]).expect("JSON");

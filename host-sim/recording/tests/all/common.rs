@@ -116,6 +116,7 @@ pub fn frames(layout: &Layout, count: usize) -> Vec<Frame> {
             truth: number.is_multiple_of(2).then(|| values(outputs)),
             contact_mm: (number % 4 != 1).then(|| [place[0], place[1], depth_mm]),
             force_n: number.is_multiple_of(2).then_some([0.1, -0.0, 1e-40]),
+            events: vec!["touch begins".into(); number % 3],
             status: Some(status.clone()),
         }
     };

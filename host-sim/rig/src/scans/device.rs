@@ -1,8 +1,9 @@
 //! Scans of a Taxel device.
 
+use std::mem;
 use std::time::Instant;
 
-use taxel_firmware::link::message::{Configuration, Report};
+use taxel_firmware::link::message::{Configuration, EventReport, Report};
 
 use super::{Scan, ScanEstimate, Source};
 use crate::device::{Device, DeviceIdentity};
@@ -21,12 +22,13 @@ pub struct Assembler {
     sent: Sent,
     /// Readings of a scan whose estimate is still to come.
     readings: Option<(u32, Vec<f32>)>,
+    events: Vec<String>,
 }
 
 impl Assembler {
     /// Assembler of scans of which this is sent.
     pub fn new(sent: Sent) -> Self {
-        Self { sent, readings: None }
+        Self { sent, readings: None, events: vec![] }
     }
 
     /// The scan that is whole with this `report`.
@@ -37,6 +39,10 @@ impl Assembler {
         let scan = match report {
             Report::Diagnosis(found) => {
                 return Err(Error::GivenUp { stalled: found.stalled_part().unwrap_or("none") });
+            }
+            Report::Event(event) => {
+                self.events.push(event_words(event));
+                return Ok(None);
             }
             Report::Readings { frame, start_us, readings_ohm } if self.sent.readings => {
                 let readings = readings_ohm.iter().collect();
@@ -50,6 +56,7 @@ impl Assembler {
                     heard: Instant::now(),
                     readings,
                     estimate: None,
+                    events: mem::take(&mut self.events),
                 }
             }
             Report::Estimate(estimate) if self.sent.estimates => {
@@ -66,12 +73,24 @@ impl Assembler {
                         deviations: estimate.deviation.iter().collect(),
                         novelty: estimate.novelty,
                     }),
+                    events: mem::take(&mut self.events),
                 }
             }
             _ => return Ok(None),
         };
         Ok(Some(scan))
     }
+}
+
+/// An event in words: `touch begins, slip ends (frame 7, 1.2 ms after its start)`.
+fn event_words(event: &EventReport) -> String {
+    let EventReport { frame, after_us, changed, going_on, .. } = event;
+    let kinds = [(1, "touch"), (2, "load"), (4, "slip")];
+    let words = kinds.iter().filter(|(bit, _)| changed & bit != 0).map(|(bit, kind)| {
+        format!("{kind} {}", if going_on & bit == 0 { "ends" } else { "begins" })
+    });
+    let (words, after_ms) = (words.collect::<Vec<_>>().join(", "), f64::from(*after_us) / 1e3);
+    format!("{words} (frame {frame}, {after_ms:.1} ms after its start)")
 }
 
 /// Scans of a device, which it sends as long as somebody listens.

@@ -55,7 +55,7 @@ impl NumberLines {
             self.scans = number.wrapping_add(1);
             let heard = Instant::now();
             let start_us = heard.duration_since(self.start).as_micros() as u64;
-            Scan { number, start_us, heard, readings, estimate: None }
+            Scan { number, start_us, heard, readings, estimate: None, events: vec![] }
         })
     }
 }

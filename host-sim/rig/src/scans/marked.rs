@@ -63,7 +63,14 @@ impl Source for MarkedBytes {
                 self.refused = 0;
                 let heard = Instant::now();
                 let start_us = heard.duration_since(self.start).as_micros() as u64;
-                take(Scan { number: self.scans, start_us, heard, readings, estimate: None });
+                take(Scan {
+                    number: self.scans,
+                    start_us,
+                    heard,
+                    readings,
+                    estimate: None,
+                    events: vec![],
+                });
                 self.scans = self.scans.wrapping_add(1);
             }
             if Instant::now() >= deadline {

@@ -5,7 +5,7 @@ use std::thread;
 use std::time::Duration;
 
 use taxel_core::blob::Floats;
-use taxel_firmware::link::message::{EstimateReport, Report};
+use taxel_firmware::link::message::{EstimateReport, EventReport, Report};
 use taxel_firmware::readout::Diagnosis;
 
 use super::*;
@@ -92,7 +92,14 @@ impl Source for Numbers {
         match self.0.recv_timeout(deadline.saturating_duration_since(Instant::now())) {
             Ok(number) => {
                 let readings = self.1.last().cloned().unwrap_or_default();
-                take(Scan { number, start_us: 0, heard: Instant::now(), readings, estimate: None });
+                take(Scan {
+                    number,
+                    start_us: 0,
+                    heard: Instant::now(),
+                    readings,
+                    estimate: None,
+                    events: vec![],
+                });
                 Ok(())
             }
             Err(mpsc::RecvTimeoutError::Timeout) => Ok(()),
@@ -160,6 +167,13 @@ fn readings_of_another_scan_do_not_stand_beside_an_estimate() {
     };
     let scan = assembler.take(&Report::Estimate(estimate)).unwrap().unwrap();
     assert!(scan.number == 2 && scan.readings.is_empty(), "{scan:?}");
+    // Events go with the next scan, whichever they are of.
+    let event =
+        EventReport { frame: 3, start_us: 20, after_us: 1234, changed: 0b101, going_on: 0b001 };
+    assert!(assembler.take(&Report::Event(event)).unwrap().is_none());
+    let scan = assembler.take(&Report::Estimate(estimate)).unwrap().unwrap();
+    assert_eq!(scan.events, ["touch begins, slip ends (frame 3, 1.2 ms after its start)"]);
+    assert!(assembler.take(&Report::Estimate(estimate)).unwrap().unwrap().events.is_empty());
     // A device that gave up a scan says which part of its readout was the first to stall.
     let diagnosis = Diagnosis { items_left: [0, 0, 5, 1], ..Diagnosis::default() };
     let given_up = assembler.take(&Report::Diagnosis(diagnosis)).unwrap_err().to_string();

@@ -184,7 +184,9 @@ pub fn record(
     let estimates = scans.iter().filter_map(|scan| scan.estimate.as_ref());
     let is_novel = |it: &&ScanEstimate| it.flags & EstimateReport::NOVEL != 0;
     let frames_novel = estimates.filter(is_novel).count();
-    let saved = Saved { frames: scans.len(), frames_per_s, frames_lost, missing, frames_novel };
+    let events = scans.iter().flat_map(|scan| scan.events.clone()).collect();
+    let frames = scans.len();
+    let saved = Saved { frames, frames_per_s, frames_lost, missing, frames_novel, events };
     Ok(saved.outcome(&action.to.output, Some(action.scan.period_us()), common))
 }
 
@@ -282,6 +284,7 @@ pub fn baseline(
         frames_lost: 0,
         missing: values_missing,
         frames_novel: 0,
+        events: vec![],
     };
     Ok(saved.outcome(&action.to.output, None, common))
 }
@@ -297,6 +300,8 @@ pub struct Saved {
     pub missing: usize,
     /// Frames that are unlike those of training, as far as the device was to tell.
     pub frames_novel: usize,
+    /// Events of touch that the device told, in words.
+    pub events: Vec<String>,
 }
 
 impl Saved {
@@ -308,6 +313,10 @@ impl Saved {
         result.fact("frames_lost", "frames lost on the line", "", self.frames_lost);
         result.fact("values_missing", "missing values", "", self.missing);
         result.fact("frames_novel", "frames unlike those of training", "", self.frames_novel);
+        result.value("events", &self.events);
+        if let Some(last) = self.events.last() {
+            result.line("events", format!("{}, the last: {last}", self.events.len()));
+        }
         result.fact("file", "file", "", file.display().to_string());
         if let Some(period_us) = period_us
             && let asked = 1e6 / f64::from(period_us.max(1))

@@ -83,7 +83,13 @@ pub fn record(line: Line, action: &RecordArguments, common: &Common) -> Result<p
         action.save(&names, starts_us, lines)?;
     }
     let frames_per_s = (span_us > 0).then(|| (count - 1) as f64 / (span_us as f64 * 1e-6));
-    let saved =
-        Saved { frames: count, frames_per_s, frames_lost: feed.lost(), missing, frames_novel };
+    let saved = Saved {
+        frames: count,
+        frames_per_s,
+        frames_lost: feed.lost(),
+        missing,
+        frames_novel,
+        events: vec![],
+    };
     Ok(saved.outcome(&action.to.output, None, common))
 }
