@@ -17,7 +17,7 @@ mod maps;
 mod population;
 mod frame;
 pub mod limit;
-pub mod moving;
+mod moving;
 pub mod reference;
 pub mod identify;
 
