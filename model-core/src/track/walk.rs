@@ -118,6 +118,7 @@ impl Settings {
 
     /// Lets a contact that hardly touches have another radius, shear and form: readings tell nothing of them, and those of the
     /// next touch may be others.
+    #[expect(clippy::needless_range_loop, reason = "rows and columns are indexed alike")]
     pub(super) fn forget_form(&self, contact: &mut Contact) {
         let Contact { mean, root, .. } = contact;
         if mean[2] > LIGHT * self.range[2][1] {
