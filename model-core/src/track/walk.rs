@@ -124,17 +124,18 @@ impl Settings {
         if mean[2] > LIGHT * self.range[2][1] {
             return;
         }
-        for latent in RATES..LATENTS {
-            root[latent] = [0.0; NUMBERS];
-            root[latent][latent] = FORGOTTEN * self.start[latent][0];
+        for (latent, row) in root.iter_mut().enumerate().take(LATENTS).skip(RATES) {
+            *row = [0.0; NUMBERS];
+            row[latent] = FORGOTTEN * self.start[latent][0];
         }
-        for rate in LATENTS..NUMBERS {
-            let mut variance = root[rate][rate] * root[rate][rate];
-            for latent in RATES..LATENTS {
-                variance += root[rate][latent] * root[rate][latent];
-                root[rate][latent] = 0.0;
+        // What rates had in common with these.
+        for (rate, row) in root.iter_mut().enumerate().skip(LATENTS) {
+            let mut variance = row[rate] * row[rate];
+            for number in row.iter_mut().take(LATENTS).skip(RATES) {
+                variance += *number * *number;
+                *number = 0.0;
             }
-            root[rate][rate] = sqrt(variance);
+            row[rate] = sqrt(variance);
         }
     }
 
