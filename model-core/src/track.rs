@@ -52,6 +52,10 @@ const YOUNG_SHARE: f32 = 0.3;
 /// Most that residuals count over their level, so that frames that no contact explains do not teach that readings scatter.
 const MOST_OVER: f32 = 3.0;
 
+/// Time in µs for which frames are left to the network behind one that no contact explains: a search takes several frames'
+/// time at 1 kHz.
+const PAUSE_US: u64 = 5000;
+
 /// Longest time in s between two frames of one trajectory.
 const LONGEST_GAP_S: f32 = 0.5;
 
@@ -78,6 +82,8 @@ pub struct State {
     other: Contact,
     /// Whether there is a contact now.
     is_known: bool,
+    /// Until when frames are left to the network.
+    paused_until_us: u64,
     /// How far a frame is explained that is not finished.
     followed: Option<Followed>,
     work: Work,
@@ -129,12 +135,26 @@ impl State {
         };
         const ZERO: Square<LATENTS> = [[0.0; LATENTS]; LATENTS];
         const NO_WORK: Work = Work { information: ZERO, columns: ZERO, product: ZERO };
-        Self { now: NOTHING, other: NOTHING, is_known: false, followed: None, work: NO_WORK }
+        Self {
+            now: NOTHING,
+            other: NOTHING,
+            is_known: false,
+            paused_until_us: 0,
+            followed: None,
+            work: NO_WORK,
+        }
     }
 
     /// Lets the next frame be the first one.
     pub fn restart(&mut self) {
-        self.is_known = false;
+        (self.is_known, self.paused_until_us) = (false, 0);
+    }
+
+    /// Whether a frame of this time is left to the network. A clock that goes back ends a pause.
+    fn is_paused(&self, at_us: u64) -> bool {
+        self.paused_until_us
+            .checked_sub(at_us)
+            .is_some_and(|left_us| (1..=PAUSE_US).contains(&left_us))
     }
 
     /// Place of the contact along x and y in mm, and the standard deviation of it; `None` while there is no contact.
@@ -199,9 +219,12 @@ impl<'a> Tracker<'a> {
         estimate: &mut Estimate<'_>,
     ) -> bool {
         let settings = &self.settings();
-        let State { now, other, is_known, followed, work } = state;
-        let at_us = frame.middle().1;
+        let (at_us, is_paused) = (frame.middle().1, state.is_paused(frame.middle().1));
+        let State { now, other, is_known, followed, work, .. } = state;
         *followed = None;
+        if is_paused {
+            return false;
+        }
         let Some(gap_s) = now.gap_s(at_us).filter(|_| *is_known) else { return false };
         settings.predict(now, gap_s, &mut other.root);
         settings.forget_form(now);
@@ -215,6 +238,9 @@ impl<'a> Tracker<'a> {
     /// outputs over it if that does, or explains the frame better than the contact before. Returns whether it wrote them.
     #[inline(never)]
     pub fn start(&self, state: &mut State, frame: &Frame<'_>, estimate: &mut Estimate<'_>) -> bool {
+        if state.is_paused(frame.middle().1) {
+            return false;
+        }
         let settings = &self.settings();
         let State { now, other, followed, work, .. } = state;
         let (level, frames) = followed.map_or((1.0, 0), |_| (now.level, now.frames));
@@ -250,6 +276,8 @@ impl<'a> Tracker<'a> {
         if is_explained {
             let ahead_s = (frame.ahead_us - frame.middle().0) * 1e-6;
             self.write(&settings.mean_after(&now.mean, ahead_s), estimate);
+        } else {
+            state.paused_until_us = now.at_us.saturating_add(PAUSE_US);
         }
         is_explained
     }

@@ -124,18 +124,22 @@ impl Settings {
         if mean[2] > LIGHT * self.range[2][1] {
             return;
         }
-        for (latent, row) in root.iter_mut().enumerate().take(LATENTS).skip(RATES) {
+        for (latent, (row, [deviation, _])) in
+            root.iter_mut().zip(self.start).enumerate().skip(RATES)
+        {
             *row = [0.0; NUMBERS];
-            row[latent] = FORGOTTEN * self.start[latent][0];
+            row.iter_mut().skip(latent).take(1).for_each(|it| *it = FORGOTTEN * deviation);
         }
         // What rates had in common with these.
         for (rate, row) in root.iter_mut().enumerate().skip(LATENTS) {
-            let mut variance = row[rate] * row[rate];
+            let mut variance = 0.0;
             for number in row.iter_mut().take(LATENTS).skip(RATES) {
                 variance += *number * *number;
                 *number = 0.0;
             }
-            row[rate] = sqrt(variance);
+            for diagonal in row.iter_mut().skip(rate).take(1) {
+                *diagonal = sqrt(*diagonal * *diagonal + variance);
+            }
         }
     }
 
