@@ -227,9 +227,17 @@ impl<'a> Tracker<'a> {
         }
         let Some(gap_s) = now.gap_s(at_us).filter(|_| *is_known) else { return false };
         settings.predict(now, gap_s, &mut other.root);
-        settings.forget_form(now);
         now.at_us = at_us;
+        let (before, was_light) = (now.mean, settings.is_light(&now.mean));
+        if was_light {
+            settings.widen_form(&mut now.root);
+        }
         let residual = self.correct(settings, now, frame, ITERATIONS, work);
+        if was_light && settings.is_light(&now.mean) {
+            // Else noise at rest would move the form.
+            let form = now.mean.iter_mut().zip(before).take(LATENTS).skip(RATES);
+            form.for_each(|(latent, before)| *latent = before);
+        }
         *followed = Some(Followed { gap_s, residual });
         self.is_explained(residual, now.level) && self.finish(settings, state, frame, estimate)
     }

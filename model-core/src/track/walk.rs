@@ -116,14 +116,13 @@ impl Settings {
         *root = *covariance;
     }
 
-    /// Lets a contact that hardly touches have another radius, shear and form: readings tell nothing of them, and those of the
-    /// next touch may be others.
-    #[expect(clippy::needless_range_loop, reason = "rows and columns are indexed alike")]
-    pub(super) fn forget_form(&self, contact: &mut Contact) {
-        let Contact { mean, root, .. } = contact;
-        if mean[2] > LIGHT * self.range[2][1] {
-            return;
-        }
+    /// Whether a contact hardly touches: readings tell nothing of its radius, shear and form.
+    pub(super) fn is_light(&self, mean: &Vector) -> bool {
+        mean[2] <= LIGHT * self.range[2][1]
+    }
+
+    /// Lets the next touch have another radius, shear and form.
+    pub(super) fn widen_form(&self, root: &mut Square<NUMBERS>) {
         for (latent, (row, [deviation, _])) in
             root.iter_mut().zip(self.start).enumerate().skip(RATES)
         {
