@@ -2,6 +2,7 @@
 
 use taxel_core::health::Limits;
 use taxel_core::relative::reciprocal;
+use taxel_core::track::{self, State, Tracker};
 use taxel_core::{Decoder, Estimate, Frame, RowStatus};
 use taxel_firmware::link::message::EstimateReport;
 use taxel_learn::ModelBlob;
@@ -13,9 +14,10 @@ use crate::{Error, Result};
 /// Most rows of a model, as many as the blob format has numbers for.
 const MOST_ROWS: usize = 255;
 
-/// A model that decodes one frame after the other.
+/// A model that decodes one frame after the other, and tracks a contact if it can.
 pub struct FrameByFrame<'b> {
     decoder: Decoder<'b, MOST_ROWS>,
+    tracker: Option<(Tracker<'b>, State)>,
     /// Limits of readings that are believed, where columns are in Ω.
     limits: Option<Limits>,
     reciprocals: Vec<f32>,
@@ -35,7 +37,8 @@ impl<'b> FrameByFrame<'b> {
         let readings = metadata.input_names.iter().count();
         let reciprocals = if metadata.relative_inputs { vec![f32::NAN; readings] } else { vec![] };
         let scratch = vec![0.0; decoder.scratch_floats()];
-        Ok(Self { decoder, limits, reciprocals, scratch })
+        let tracker = blob.parse().tracker().map(|tracker| (tracker, State::new()));
+        Ok(Self { decoder, tracker, limits, reciprocals, scratch })
     }
 
     /// What is to be said while the model divides readings by a baseline, and has none yet.
@@ -74,6 +77,7 @@ impl<'b> FrameByFrame<'b> {
         for reading in readings.iter_mut().filter(|reading| is_faulty(reading)) {
             (*reading, any_faulty) = (f32::NAN, true);
         }
+        let measured = readings.clone();
         self.decoder.fill(&mut readings, &self.reciprocals, &mut self.scratch);
         let frame = Frame { readings_ohm: &readings, reciprocals: &self.reciprocals };
         let mut outputs = vec![f32::NAN; shape.rows * shape.outputs];
@@ -82,6 +86,18 @@ impl<'b> FrameByFrame<'b> {
         let failed = |cause: taxel_core::rbf::NetworkError| Error::failed(cause.to_string());
         let clamped =
             self.decoder.decode_into(frame, &mut self.scratch, &mut estimate).map_err(failed)?;
+        if let Some((tracker, state)) = &mut self.tracker {
+            let frame = track::Frame {
+                readings_ohm: &measured,
+                reciprocals: Some(&self.reciprocals[..]).filter(|all| !all.is_empty()),
+                start_us: moment.frame.time_us,
+                row_us: &vec![0.0; shape.rows],
+                ahead_us: 0.0,
+            };
+            if !tracker.follow(state, &frame, &mut estimate) {
+                tracker.start(state, &frame, &mut estimate);
+            }
+        }
         let mut deviations = vec![f32::NAN; outputs.len()];
         let novelty =
             self.decoder.assess_into(frame, &mut self.scratch, &mut deviations).map_err(failed)?;
@@ -102,7 +118,8 @@ impl<'b> FrameByFrame<'b> {
 
 #[cfg(test)]
 mod tests {
-    use taxel_data::Stream;
+    use taxel_data::{Silent, Stream};
+    use taxel_learn::tracked::{Series, track_table};
     use taxel_recording::Frame;
     use taxel_simulate::Synthesis;
 
@@ -149,5 +166,28 @@ mod tests {
         assert!(filled.frame.outputs.unwrap().iter().all(|it| it.is_finite()));
         let far = decode(readings.iter().map(|it| 0.3 * it).collect(), &mut decoder);
         assert_eq!(far.flags, EstimateReport::NOVEL | EstimateReport::CLAMPED);
+    }
+
+    #[test]
+    fn a_contact_is_tracked_as_in_a_data_file() {
+        let mut scene = Experiment::load("moving").unwrap();
+        (scene.frames, scene.training.refine, scene.training.track) = (1000, false, true);
+        let blob = scene.train(&Silent).unwrap();
+        let rest = Synthesis::new(&scene.world).untouched().frames(Stream::Test, 20).inputs;
+        let start_us: Vec<u64> = (0..20).map(|frame| 10_000 * frame).collect();
+        let series = Series { start_us: &start_us, faulty: &[] };
+        let (model, parsed) = (blob.prepare(), blob.parse());
+        let expected = track_table(&model, parsed.tracker().unwrap(), &rest, series, 0.0);
+        let mut decoder = FrameByFrame::new(&blob).unwrap();
+        for (line, time_us) in start_us.into_iter().enumerate() {
+            let readings = rest.line(line).iter().map(|it| *it as f32).collect();
+            let mut moment = Moment::new(Frame { readings, time_us, ..Frame::default() });
+            decoder.decode(&mut moment).unwrap();
+            let outputs = moment.frame.outputs.unwrap();
+            assert!(
+                outputs.iter().map(|it| f64::from(*it)).eq(expected.line(line).iter().copied())
+            );
+        }
+        assert_ne!(expected.values, model.decode_table(&rest).values);
     }
 }
