@@ -81,14 +81,7 @@ fn counted_frames_are_predicted_to_a_tenth() {
 #[test]
 fn a_filter_takes_what_its_page_says() {
     let page = include_str!("../../../../docs/filter.md");
-    for (name, rows, outputs) in [
-        ("144 outputs of 8 rows", 8, 18),
-        ("48 outputs of 8 rows", 8, 6),
-        ("6 outputs of one row", 1, 6),
-    ] {
-        let Cost { instructions, cycles } = Cost::of_filter(ModelShape { outputs, rows, ..PAPER });
-        let us = cycles as f64 / 180.0;
-        let line = format!("| {name} | {instructions} | {cycles} | {us:.0} µs |");
-        assert!(page.contains(&line), "docs/filter.md should say\n{line}");
-    }
+    let cost = Cost::of_filter(ModelShape { outputs: 18, rows: 8, ..PAPER });
+    let line = format!("144 outputs take {:.0} µs", cost.cycles as f64 / 180.0);
+    assert!(page.contains(&line), "docs/filter.md should say\n{line}");
 }
