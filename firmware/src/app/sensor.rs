@@ -294,6 +294,7 @@ impl<F: FrameSource, const ROWS: usize> Sensor<'_, F, ROWS> {
             return;
         }
         self.stop_scan();
+        link.platform().signal([false; 3]);
         (self.configuration, self.is_configured_anew) = (configuration, true);
         self.give_up_capture(link);
         self.answers |= configuration.frame_period_us == 0; // it is not scanned any more

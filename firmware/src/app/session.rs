@@ -95,7 +95,10 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
         let names = decoder.map_or(Columns(""), |decoder| decoder.metadata().input_names);
         work.rows = shape.rows;
         work.outputs = shape.rows.saturating_mul(shape.outputs);
-        work.force = decoder.and_then(|it| it.metadata().output_units.position("N"));
+        // Behind forces along x and y comes the one along z.
+        let units = decoder.map_or(Columns(""), |decoder| decoder.metadata().output_units);
+        work.force =
+            units.iter().enumerate().filter(|(_, unit)| *unit == "N").map(|it| it.0).last();
         sensor.scan_wires(capacity, names, shape, link);
         if sensor.baseline.frames() == 0 && sensor.capture.is_none() {
             sensor.load_baseline(link);

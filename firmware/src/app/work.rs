@@ -63,7 +63,7 @@ impl<const ROWS: usize> Work<'_, ROWS> {
         let health = sensor.judge_frame();
         let mut flags = if health.is_good() { 0 } else { EstimateReport::FAULTY_READING };
         let is_touched = sensor.is_touched(scan.is_some());
-        if scan.is_some() {
+        if scan.is_some() && sensor.configuration.frame_period_us > 0 {
             // A touch need not wait until the frame is decoded.
             link.platform().signal([
                 is_touched,
@@ -85,6 +85,7 @@ impl<const ROWS: usize> Work<'_, ROWS> {
             if mem::take(&mut sensor.is_configured_anew) {
                 self.filter.restart();
                 self.contact.restart();
+                self.events = Events::default();
             }
             let relative_inputs = decoder.metadata().relative_inputs;
             let has_baseline = !relative_inputs || self.has_reciprocals;

@@ -1,6 +1,6 @@
 //! Events of a touch: what is reported, and what the board's pins show.
 
-use taxel_firmware::link::message::{Configuration, EventReport, Report};
+use taxel_firmware::link::message::{Configuration, EventReport, Report, Request};
 
 use crate::mock::*;
 
@@ -60,6 +60,22 @@ fn touch_and_load_are_reported_before_the_estimate_and_shown_before_that() {
     };
     assert_eq!(loaded(&blob), [[3, 3], [1, 2]]); // up to 1.06, and then 1.005
     assert_eq!(loaded(&blob_of_units("mm\nmm\nmm\nN")), [[1, 1], [1, 0]]); // 1.005
+    assert_eq!(loaded(&blob_of_units("mm\nN\nmm\nN")), [[1, 1], [1, 0]]); // the last force is that along z
+}
+
+#[test]
+fn pins_show_nothing_while_nothing_is_scanned() {
+    let scanning = Configuration { frame_period_us: 1000, ..Configuration::DEFAULT };
+    let mut host = started(scanning, &blob(3, 4));
+    host.set_baseline(frame_at_rest().as_flattened());
+    *host.frame() = frame_with(0, 0, 57.0);
+    let now_us = host.pins().now_us;
+    host.run_until(now_us + 5000);
+    assert_eq!(host.pins().signal, [true, false, false]);
+    host.tell(&Request::Configure(Configuration { frame_period_us: 0, ..scanning }));
+    assert_eq!(host.pins().signal, [false; 3]);
+    host.decode(&frame_with(0, 0, 57.0));
+    assert_eq!(host.pins().signal, [false; 3]);
 }
 
 #[test]

@@ -104,6 +104,11 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<print::Outcome>
     remark_on_range(&model, &readings, common);
     let settings = arguments.filter.settings();
     let tracker = parsed.tracker().filter(|_| !settings.is_on());
+    let has_times = arguments.filter.lead_ms.is_some() || arguments.period.period_ms.is_some();
+    if has_times && tracker.is_none() && !settings.is_on() {
+        let rule = "--lead-ms and --period-ms are of a filter or a tracker, and MODEL has no tracker: give --filter-ms as well";
+        return Err(Error::Usage(rule.into()));
+    }
     let mut estimate = match tracker.map(|tracker| (tracker, arguments.period.of_file(&file))) {
         Some((tracker, Ok(start_us))) => {
             let frames = Series { start_us: &start_us, faulty: &health.faulty };

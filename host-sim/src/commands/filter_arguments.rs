@@ -13,7 +13,7 @@ pub struct FilterArguments {
     #[arg(long, value_name = "MS", value_parser = milliseconds)]
     pub filter_ms: Option<u32>,
     /// Time in ms by which the filter or the tracker extrapolates outputs: their age when they are used.
-    #[arg(long, value_name = "MS", requires = "filter_ms", value_parser = milliseconds)]
+    #[arg(long, value_name = "MS", value_parser = milliseconds)]
     pub lead_ms: Option<u32>,
 }
 
@@ -30,9 +30,9 @@ impl FilterArguments {
 /// Option for frames without times.
 #[derive(Args)]
 pub struct PeriodArgument {
-    /// Time in ms from one frame to the next, for the filter; without it a file's column with the time tells.
-    #[arg(long, value_name = "MS", requires = "filter_ms", value_parser = period)]
-    period_ms: Option<u32>,
+    /// Time in ms from one frame to the next, for the filter or the tracker; without it a file's column with the time tells.
+    #[arg(long, value_name = "MS", value_parser = period)]
+    pub period_ms: Option<u32>,
 }
 
 impl PeriodArgument {
@@ -55,7 +55,7 @@ impl PeriodArgument {
                 None => "no column is called as times are".into(),
             });
             return unfit(format!(
-                "--filter-ms needs times, and {why}: add a column time_s, or give --period-ms"
+                "a filter and a tracker need times, and {why}: add a column time_s, or give --period-ms"
             ));
         }
         let start_us: Vec<u64> = clock.at.iter().map(|s| (s * 1e6).round() as u64).collect();

@@ -53,6 +53,9 @@ impl<'b> FrameByFrame<'b> {
     pub fn set_baseline(&mut self, readings: &[f32]) {
         let reciprocals = self.reciprocals.iter_mut().zip(readings);
         reciprocals.for_each(|(its, reading)| *its = reciprocal(*reading));
+        if let Some((_, state)) = &mut self.tracker {
+            state.restart();
+        }
     }
 
     /// Decodes the readings of a moment, and says of it what a device would.
@@ -86,6 +89,7 @@ impl<'b> FrameByFrame<'b> {
         let failed = |cause: taxel_core::rbf::NetworkError| Error::failed(cause.to_string());
         let clamped =
             self.decoder.decode_into(frame, &mut self.scratch, &mut estimate).map_err(failed)?;
+        let mut is_tracked = false;
         if let Some((tracker, state)) = &mut self.tracker {
             let frame = track::Frame {
                 readings_ohm: &measured,
@@ -94,9 +98,8 @@ impl<'b> FrameByFrame<'b> {
                 row_us: &vec![0.0; shape.rows],
                 ahead_us: 0.0,
             };
-            if !tracker.follow(state, &frame, &mut estimate) {
-                tracker.start(state, &frame, &mut estimate);
-            }
+            is_tracked = tracker.follow(state, &frame, &mut estimate)
+                || tracker.start(state, &frame, &mut estimate);
         }
         let mut deviations = vec![f32::NAN; outputs.len()];
         let novelty =
@@ -104,7 +107,7 @@ impl<'b> FrameByFrame<'b> {
         let flags = [
             (any_faulty, EstimateReport::FAULTY_READING),
             (status.contains(&RowStatus::Overflow), EstimateReport::OVERFLOW),
-            (clamped, EstimateReport::CLAMPED),
+            (clamped && !is_tracked, EstimateReport::CLAMPED),
             (novelty.is_some_and(|novelty| novelty > 0.0), EstimateReport::NOVEL),
         ];
         moment.flags = flags.into_iter().filter(|(set, _)| *set).map(|(_, flag)| flag).sum();

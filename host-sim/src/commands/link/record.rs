@@ -147,7 +147,11 @@ pub fn record(
     let every = action.reports.report_every.unwrap_or(1);
     let patience = patience_for_next(&action.scan, &identity, every);
     let filter = action.reports.filter.settings();
+    let own = device.configuration()?;
     let decoding = Configuration {
+        contact_threshold: own.contact_threshold,
+        load_threshold: own.load_threshold,
+        slip_mm_per_s: own.slip_mm_per_s,
         confidence: confidence.into(),
         filter_time_constant_us: filter.time_constant_us,
         filter_lead_us: filter.lead_us,
