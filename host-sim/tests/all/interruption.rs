@@ -207,8 +207,9 @@ fn a_model_on_trial_is_left_by_a_restart_unless_it_is_confirmed() {
 #[test]
 fn a_recording_that_is_interrupted_leaves_no_file_and_the_device_as_it_was() {
     let rig = Rig::new("interrupted", model(3).bytes());
-    // The last request lets the device scan for the host: it identifies, pauses, configures, and captures.
-    for (command, requests) in [("record", 3), ("baseline", 4)] {
+    // The last request lets the device scan for the host: it identifies, pauses, configures, and captures. A recording asks
+    // for the device's own configuration as well.
+    for (command, requests) in [("record", 4), ("baseline", 4)] {
         let arguments = [command, "-n", "50000", "-o", "x.csv", "--period-us", "1000"];
         let (status, ended) = rig.end_at(&arguments, requests, End::Interrupt);
         assert!(ended, "{command}");
@@ -222,7 +223,7 @@ fn a_recording_that_is_interrupted_leaves_no_file_and_the_device_as_it_was() {
 fn what_a_dead_host_has_left_is_seen_and_ends_with_the_next_ones_work() {
     let rig = Rig::new("dead", model(3).bytes());
     let recording = ["record", "-n", "50000", "-o", "x.csv", "--period-us", "1000"];
-    assert!(rig.end_at(&recording, 2, End::Kill).1);
+    assert!(rig.end_at(&recording, 3, End::Kill).1);
     let page = rig.folder.succeed(&["link", &rig.port, "identify"]);
     assert!(page.contains("scanning: paused"), "{page}");
     rig.folder.succeed(&["link", &rig.port, "record", "-n", "3", "-o", "x.csv"]);
