@@ -7,6 +7,7 @@
 use core::mem;
 
 use crate::contact::Detector;
+use crate::reading_model::sqrt;
 
 /// Time τ in s over which a touch's place is averaged.
 const REST_S: f32 = 0.1;
@@ -109,7 +110,7 @@ impl Events {
         let share = weight / self.weight;
         self.rest_mm = [self.rest_mm[0] + share * x, self.rest_mm[1] + share * y];
         let uncertain = if self.slip.is_touched() { 0.0 } else { CERTAIN * deviation_mm };
-        if share < 1.0 { (libm::sqrtf(x * x + y * y) - uncertain) / REST_S } else { 0.0 }
+        if share < 1.0 { (sqrt(x * x + y * y) - uncertain) / REST_S } else { 0.0 }
     }
 
     /// Whether it goes on.

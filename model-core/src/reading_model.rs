@@ -467,7 +467,7 @@ fn solve(matrix: &mut [f32], x: &mut [f32]) -> bool {
 }
 
 /// Square root, rounded correctly.
-pub fn sqrt(value: f32) -> f32 {
+pub(crate) fn sqrt(value: f32) -> f32 {
     #[cfg(cortex_m4f)]
     return crate::cortex_m4::sqrt(value);
     #[cfg(not(cortex_m4f))]

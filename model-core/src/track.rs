@@ -219,12 +219,12 @@ impl<'a> Tracker<'a> {
         estimate: &mut Estimate<'_>,
     ) -> bool {
         let settings = &self.settings();
-        let (at_us, is_paused) = (frame.middle().1, state.is_paused(frame.middle().1));
-        let State { now, other, is_known, followed, work, .. } = state;
-        *followed = None;
-        if is_paused {
+        let at_us = frame.middle().1;
+        state.followed = None;
+        if state.is_paused(at_us) {
             return false;
         }
+        let State { now, other, is_known, followed, work, .. } = state;
         let Some(gap_s) = now.gap_s(at_us).filter(|_| *is_known) else { return false };
         settings.predict(now, gap_s, &mut other.root);
         now.at_us = at_us;
@@ -261,6 +261,12 @@ impl<'a> Tracker<'a> {
             before.residual = residual;
         }
         self.finish(settings, state, frame, estimate)
+    }
+
+    /// Follows a frame of which the `estimate` is a network's already, or else starts from it. Returns whether outputs are the
+    /// tracker's.
+    pub fn track(&self, state: &mut State, frame: &Frame<'_>, estimate: &mut Estimate<'_>) -> bool {
+        self.follow(state, frame, estimate) || self.start(state, frame, estimate)
     }
 
     /// Learns the level of residuals from a frame, and writes its outputs if it is explained. Returns whether it is.

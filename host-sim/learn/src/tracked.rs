@@ -55,9 +55,7 @@ impl<'b, D: FrameDecoder> Tracked<'b, D> {
                 row_us: &row_us,
                 ahead_us: self.ahead_us,
             };
-            if !self.tracker.follow(state, &frame, &mut estimate) {
-                self.tracker.start(state, &frame, &mut estimate);
-            }
+            self.tracker.track(state, &frame, &mut estimate);
             values.iter_mut().zip(outputs).for_each(|(value, output)| *value = f64::from(output));
         }
     }

@@ -98,8 +98,7 @@ impl<'b> FrameByFrame<'b> {
                 row_us: &vec![0.0; shape.rows],
                 ahead_us: 0.0,
             };
-            is_tracked = tracker.follow(state, &frame, &mut estimate)
-                || tracker.start(state, &frame, &mut estimate);
+            is_tracked = tracker.track(state, &frame, &mut estimate);
         }
         let mut deviations = vec![f32::NAN; outputs.len()];
         let novelty =

@@ -1,6 +1,6 @@
 //! Small dense matrices.
 
-pub use crate::reading_model::sqrt;
+pub(crate) use crate::reading_model::sqrt;
 
 /// Rows of numbers.
 pub type Square<const N: usize> = [[f32; N]; N];

@@ -50,16 +50,6 @@ fn tracker(block: &[f32]) -> Tracker<'_> {
     Tracker::new(SIZES, block).unwrap()
 }
 
-/// Takes a frame of which the network's estimate is given.
-fn take(
-    tracker: &Tracker<'_>,
-    state: &mut State,
-    frame: &Frame<'_>,
-    estimate: &mut Estimate<'_>,
-) -> bool {
-    tracker.follow(state, frame, estimate) || tracker.start(state, frame, estimate)
-}
-
 /// A contact that slides, is pressed and sheared, at a time.
 fn contact(time_s: f32) -> Latents {
     let depth = 0.4 + 0.3 * (12.0 * time_s).sin();
@@ -124,7 +114,7 @@ fn track(frames: u32, change: impl Fn(u32, &mut [f32])) -> (f32, u32) {
             row_us: &row_us,
             ahead_us: 3000.0,
         };
-        let is_explained = take(&tracker, &mut state, &frame_read, &mut estimate);
+        let is_explained = tracker.track(&mut state, &frame_read, &mut estimate);
         explained += u32::from(is_explained);
         if frame >= frames / 2 && is_explained {
             let errors = tracker.places_mm.iter().zip(&outputs);
@@ -173,7 +163,7 @@ fn gaps_and_times_that_go_back_start_anew() {
         let mut estimate = Estimate { outputs: &mut outputs, status: &mut status };
         let (row_us, reciprocals) = (&[0.0; 4], None);
         let frame = Frame { readings_ohm: &ohm, reciprocals, start_us, row_us, ahead_us: 0.0 };
-        take(&tracker, state, &frame, &mut estimate);
+        tracker.track(state, &frame, &mut estimate);
         (state.is_known, state.now.mean)
     };
     let first = at(&mut State::new(), 0);
@@ -285,7 +275,7 @@ fn floats_that_no_tracker_has_are_refused_and_no_number_makes_it_panic() {
                     row_us: &[number; 3],
                     ahead_us: number,
                 };
-                take(&tracker, &mut state, &frame, &mut estimate);
+                tracker.track(&mut state, &frame, &mut estimate);
             }
         }
     }

@@ -25,7 +25,7 @@ const FORGOTTEN: f32 = 0.5;
 /// A number for each of the state's.
 pub type Vector = [f32; NUMBERS];
 
-/// Those of the latents.
+/// The latents among the numbers of a state.
 pub fn latents(numbers: &Vector) -> &Latents {
     numbers.first_chunk().unwrap_or(&[0.0; LATENTS])
 }
@@ -127,7 +127,9 @@ impl Settings {
             root.iter_mut().zip(self.start).enumerate().skip(RATES)
         {
             *row = [0.0; NUMBERS];
-            row.iter_mut().skip(latent).take(1).for_each(|it| *it = FORGOTTEN * deviation);
+            if let Some(diagonal) = row.get_mut(latent) {
+                *diagonal = FORGOTTEN * deviation;
+            }
         }
         // What rates had in common with these.
         for (rate, row) in root.iter_mut().enumerate().skip(LATENTS) {
@@ -136,7 +138,7 @@ impl Settings {
                 variance += *number * *number;
                 *number = 0.0;
             }
-            for diagonal in row.iter_mut().skip(rate).take(1) {
+            if let Some(diagonal) = row.get_mut(rate) {
                 *diagonal = sqrt(*diagonal * *diagonal + variance);
             }
         }
