@@ -15,7 +15,7 @@ use taxel_firmware::readout::{
 #[path = "../../testdata/row4.rs"]
 mod row4;
 
-/// Resistors and voltages of the circuit. `docs/readout.md` says how to measure them.
+/// Resistors and voltages of the circuit. `docs/board.md` says how to measure them.
 const CIRCUIT: ZeroPotential<8, 18> = ZeroPotential::TYPICAL;
 /// A row settles for 20 µs. Each column is sampled once.
 const SETTINGS: ScanSettings = ScanSettings { settling_us: 20, oversampling: 1 };

@@ -1,6 +1,6 @@
 //! From ADC counts to Ω: the circuit that a sensor is read with, as pure arithmetic.
 //!
-//! `docs/readout.md` draws it, derives the equations, and explains how to measure the constants.
+//! `docs/board.md` draws it, derives the equations, and explains how to measure the constants.
 //! Readings of the paper's sensor are near 60 Ω, and its 18 columns together load a row with 3.3 Ω. A resistance
 //! in series with a row is therefore never negligible, and is corrected for.
 

@@ -4,7 +4,7 @@
 //! 1.0; [`Scanner`] makes a [`FrameSource`] of them. Hardware that scans by itself is a [`Sequencer`], for
 //! [`PassScanner`]. A scan never fails as a whole: a reading that could not be taken is NaN, and counted.
 //!
-//! `docs/readout.md` has the circuit, its parts and the timing.
+//! `docs/board.md` has the circuit, its parts and the timing.
 
 use serde::{Deserialize, Serialize};
 use taxel_core::{ColumnWire, ColumnWires, RowWire};

@@ -31,7 +31,7 @@ STATISTICS, CAPTURE, SET_BROWN_OUT = b"\x01", b"\x04", b"\x10"
 ON_TRIAL = b"\x07\x02"
 #: Slowest and fastest clock of the watchdog in Hz, and the longest time in s to erase a slot (DS10693).
 SLOWEST_LSI_HZ, FASTEST_LSI_HZ, SLOWEST_ERASE_S = 17_000, 47_000, 4.0
-#: Gain-bandwidth product of the slowest op-amps in Hz that settle while the board waits (docs/readout.md).
+#: Gain-bandwidth product of the slowest op-amps in Hz that settle while the board waits (docs/board.md).
 SLOWEST_OP_AMP_HZ = 6.5e6
 #: By how much the internal oscillator may be off from -10 to 85 degrees, as a share (DS10693).
 LARGEST_HSI_ERROR = 0.04

@@ -98,7 +98,7 @@ enum Command {
         checks: bool,
     },
     /// Pack every crate that is published, and build it from its package; those of a device with their oldest Rust, too.
-    /// Nothing is published (docs/crates.md).
+    /// Nothing is published (docs/c.md).
     Publish(publish::Options),
 }
 

@@ -1,4 +1,4 @@
-//! What is published to crates.io (docs/crates.md): packed and built as `cargo publish` does, and published by nobody.
+//! What is published to crates.io (docs/c.md): packed and built as `cargo publish` does, and published by nobody.
 
 use std::process::Command;
 

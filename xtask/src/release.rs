@@ -53,7 +53,7 @@ fn failed(path: &Path, cause: &dyn std::fmt::Display) -> String {
     format!("{}: {cause}", path.display())
 }
 
-/// Packs the crates that are published (docs/crates.md).
+/// Packs the crates that are published (docs/c.md).
 fn crates(folder: &Path) -> Outcome {
     let metadata = metadata()?;
     let packages = metadata["packages"].as_array().into_iter().flatten();

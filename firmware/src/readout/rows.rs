@@ -1,4 +1,4 @@
-//! Shift registers that select a row. An active output is high; `docs/readout.md` shows what it switches.
+//! Shift registers that select a row. An active output is high; `docs/board.md` shows what it switches.
 
 use embedded_hal::digital::OutputPin;
 use taxel_core::RowWire;

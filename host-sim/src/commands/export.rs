@@ -19,7 +19,7 @@ use super::{Common, print};
 /// need. It needs no heap and no other library, holds any model, and gives the bits that the blob gives (docs/c.md).
 ///
 /// In Rust, it is a file of arrays of fixed size, and functions that call `taxel_core` with them. Nothing in it is parsed, and
-/// nothing can fail. It holds any model, too, and gives the bits that the blob gives (docs/formats.md).
+/// nothing can fail. It holds any model, too, and gives the bits that the blob gives (docs/c.md).
 #[derive(Args)]
 #[command(group(ArgGroup::new("language").required(true)))]
 #[command(after_help = "Examples:

@@ -1,4 +1,4 @@
-//! The firmware's readout on the virtual board: how far a reading is off. docs/readout.md derives the equations.
+//! The firmware's readout on the virtual board: how far a reading is off. docs/board.md derives the equations.
 
 use taxel_core::ColumnWires;
 use taxel_core::health::Limits;
