@@ -1,4 +1,4 @@
-"""Pairs the readings and the truth of eFlesh's recordings by time, for docs/real.md: `python eflesh_pairs.py eFlesh`."""
+"""Pairs the readings and the truth of eFlesh's recordings by time, for docs/gallery.md: `python eflesh_pairs.py eFlesh`."""
 
 import sys
 from pathlib import Path

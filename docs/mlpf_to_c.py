@@ -1,5 +1,5 @@
 # %% [markdown]
-# From real presses to C, in twenty lines: the fingertip of docs/real.md.
+# From real presses to C, in twenty lines: the fingertip of docs/gallery.md.
 # Cells as Jupyter (jupytext), VS Code and Spyder take them; or `python docs/mlpf_to_c.py mlpf.csv`.
 # It needs `pip install taxel pandas matplotlib`.
 

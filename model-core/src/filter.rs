@@ -11,7 +11,7 @@
 //! Electronic Systems 20, 1984) relates α and β to the ratio of acceleration and noise.
 //!
 //! The output is y + v·*lead*: what is expected so much later.
-//! dt comes from the frames' times, not from an assumed period. `docs/filter.md` explains it.
+//! dt comes from the frames' times, not from an assumed period. `docs/rate.md` explains it.
 
 use crate::estimate::{Estimate, RowStatus};
 use crate::exp::exp;

@@ -2,7 +2,7 @@
 //!
 //! f = f₀ + Σ_j r_j·p_j over all readings r of a frame, in Ω. It is linear, so that white noise averages out over
 //! the array. Usually there are as many features as a row has readings, so that the same inner loops serve both. The
-//! directions p come from training; `docs/features.md` explains how.
+//! directions p come from training; `docs/training.md` explains how.
 
 #[cfg(cortex_m4f)]
 use crate::cortex_m4;

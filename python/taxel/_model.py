@@ -83,7 +83,7 @@ class Model(MultiOutputMixin, RegressorMixin, BaseEstimator):
     features : int or None
         Features of that projection.
     features_kind : str or None
-        How features are made of readings: "plain", "normalised" or "normalised:K" (docs/features.md); None for those with the
+        How features are made of readings: "plain", "normalised" or "normalised:K" (docs/training.md); None for those with the
         least error on lines held out, for places and for amounts.
     grid : (int, int) or None
         Rows and columns of a mat whose cells are the columns of X, row by row. Without it, names of a DataFrame may tell a mat

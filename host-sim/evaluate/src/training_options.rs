@@ -113,7 +113,7 @@ pub struct TrainingOptions {
     /// readings, fill takes 7 kB, and full 27 kB. Either takes ten frames of training for each reading.
     #[arg(long, value_name = "EXTENT", value_parser = extent())]
     pub reading_model: Option<Extent>,
-    /// Give the model a tracker of one contact that moves (docs/filter.md): its deformations are then those of a contact
+    /// Give the model a tracker of one contact that moves (docs/rate.md): its deformations are then those of a contact
     /// that fits the readings of all frames so far. For scenes of one contact; 36 kB for 8 × 18 wires.
     #[arg(long, action = ArgAction::Set, num_args = 0, default_missing_value = "true")]
     pub track: Option<bool>,

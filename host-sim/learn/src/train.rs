@@ -75,7 +75,7 @@ pub const INITIAL_COVARIANCE: f64 = 1e6;
 /// Factor on the spread for networks of a whole array, relative to those of a row.
 ///
 /// Features of a projection share the largest span of any. With this factor K = 64 is as good, and K =
-/// 256 better (`docs/features.md`).
+/// 256 better (`docs/training.md`).
 pub const WHOLE_ARRAY_SPREAD: f64 = 0.5;
 
 /// Usual spread of a network that is given the readings of a row.

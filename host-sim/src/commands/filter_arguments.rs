@@ -9,7 +9,7 @@ use taxel_data::{Clock, DataFile};
 /// Options of the filter in time.
 #[derive(Args, Serialize)]
 pub struct FilterArguments {
-    /// Filter outputs in time, with this time constant in ms; 0 filters nothing (docs/filter.md).
+    /// Filter outputs in time, with this time constant in ms; 0 filters nothing (docs/rate.md).
     #[arg(long, value_name = "MS", value_parser = milliseconds)]
     pub filter_ms: Option<u32>,
     /// Time in ms by which the filter or the tracker extrapolates outputs: their age when they are used.

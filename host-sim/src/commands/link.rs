@@ -74,7 +74,7 @@ enum Action {
     ///
     /// Each line of PRESSES tells what the outputs truly are. With columns of the readings as well, these are taken;
     /// otherwise the device scans, and you are asked for one press after the other. -o saves the mended model too: `record` and
-    /// the next recalibration take it. docs/drift.md says more.
+    /// the next recalibration take it. docs/drift.md has more.
     #[command(
         after_help = "Example: taxel link /dev/ttyACM0 recalibrate press.bin presses.csv -o mended.bin"
     )]

@@ -36,7 +36,7 @@ const SIMULATED_RATE: f64 = 100.0;
 ///
 /// The page is served to this computer alone, at 127.0.0.1, and asks nothing of any other. It shows the sheet and the readings with
 /// fixed scales, the contact over time, what is wrong, and how old the picture is. It zeroes, pauses, records and takes
-/// screenshots. docs/live.md tells more.
+/// screenshots. docs/live.md has more.
 #[derive(Args)]
 #[command(mut_arg("model", |it| it.help("Weight blob. It names what a device decodes, and decodes what nobody has decoded; a \
                                          scene without one trains its own")))]

@@ -357,7 +357,7 @@ fn moving_contacts(sections: &mut Sections, moving: Option<&MovingContacts>) {
     sections.value("moving_limit", &moving.limit);
     for filter in moving.ways.iter().filter_map(|way| way.filter) {
         sections.note(format!(
-            "The filter on a device: `taxel link PORT configure --filter-ms {} --lead-ms {}` (docs/filter.md).",
+            "The filter on a device: `taxel link PORT configure --filter-ms {} --lead-ms {}` (docs/rate.md).",
             filter.time_constant_ms, filter.lead_ms
         ));
     }

@@ -128,8 +128,8 @@ pub fn faults(pages: &[Page]) -> Vec<String> {
     faults
 }
 
-/// Index of the docs, by which mdBook orders them.
-const INDEX: &str = "docs/SUMMARY.md";
+/// Index of the docs, whose order the site has.
+pub const INDEX: &str = "docs/README.md";
 
 #[cfg(test)]
 mod tests {
@@ -138,7 +138,7 @@ mod tests {
     #[test]
     fn links_and_anchors_are_found_and_what_leads_nowhere_is_named() {
         let page = Page::new(
-            "docs/SUMMARY.md",
+            INDEX,
             "# A `b`: c, d\n\n[1](../README.md#taxel) [2](#a-b-c-d) [3](#e)\n![4](none.svg)\n\n```\n[5](code.md)\n```\n".into(),
         );
         assert_eq!(page.links, ["../README.md#taxel", "#a-b-c-d", "#e", "none.svg"]);

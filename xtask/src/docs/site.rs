@@ -4,8 +4,8 @@ use std::fs;
 use std::path::Path;
 use std::process::Command;
 
-use super::pages::from_root;
-use crate::process::{Outcome, first_line, root, run as run_command, target_dir};
+use super::pages::{INDEX, from_root};
+use crate::process::{Outcome, first_line, read, root, run as run_command, target_dir};
 
 /// Builds docs/ into a folder.
 pub fn build(site: &Path) -> Outcome {
@@ -29,6 +29,7 @@ pub fn build(site: &Path) -> Outcome {
             fs::copy(entry.path(), &to).map_err(failed)?;
         }
     }
+    fs::write(source.join("docs/SUMMARY.md"), summary(&read(INDEX)?)).map_err(failed)?;
     run_command(Command::new("mdbook").arg("build").arg(&source).arg("--dest-dir").arg(site))?;
     println!("{}", site.join("index.html").display());
     Ok(())
@@ -48,8 +49,38 @@ fn inside(text: &str) -> String {
     pattern.replace_all(text, named).into_owned()
 }
 
+/// Pages in the order of the index, under its headings, as mdBook expects them.
+fn summary(index: &str) -> String {
+    let mut summary = String::from("# Summary\n\n[What is where](README.md)\n");
+    let mut heading = "";
+    for line in index.lines() {
+        if line.starts_with("## ") {
+            heading = line;
+        } else if line.starts_with("- [")
+            && let Some(end) = line.find(')')
+        {
+            if !heading.is_empty() {
+                summary.push_str(&format!("\n{}\n\n", &heading[1..]));
+                heading = "";
+            }
+            summary.push_str(&line[..=end]);
+            summary.push('\n');
+        }
+    }
+    summary
+}
+
 #[cfg(test)]
 mod tests {
+    #[test]
+    fn summary_has_pages_under_their_headings() {
+        let index = "# Docs\n\nSee [x](x.md).\n\n## One\n\n- [A](a.md): first\n- [B](b.md)\n\n## Words\n\n- **word**: [A](a.md)\n";
+        assert_eq!(
+            super::summary(index),
+            "# Summary\n\n[What is where](README.md)\n\n# One\n\n- [A](a.md)\n- [B](b.md)\n"
+        );
+    }
+
     #[test]
     fn links_out_of_the_docs_become_paths() {
         let text = "[a](b.md#c), [the scanner](../firmware/src/readout.rs#x), [ARCHITECTURE.md](../ARCHITECTURE.md)";

@@ -129,9 +129,9 @@ impl Warning {
         Self::when(!worst.is_empty(), "other-contacts", || {
             let more = if more == 0 { String::new() } else { format!(" and {more} more") };
             let advice = if has_novelty {
-                "; train on a mix (docs/contact.md), and believe no estimate that is novel"
+                "; train on a mix (docs/scenes.md), and believe no estimate that is novel"
             } else {
-                "; train on a mix (docs/contact.md), or let a reading model notice them (train --reading-model full)"
+                "; train on a mix (docs/scenes.md), or let a reading model notice them (train --reading-model full)"
             };
             format!(
                 "contacts unlike those of training are decoded worse: {}{more}{advice}",
@@ -181,7 +181,7 @@ impl Warning {
                 count => format!("{count} of {} inputs drift", rest.readings),
             };
             format!(
-                "at rest, {count} {}: {}; docs/drift.md tells what may help",
+                "at rest, {count} {}: {}; docs/drift.md has remedies",
                 rest.span,
                 named.join(", ")
             )

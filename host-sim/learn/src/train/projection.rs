@@ -6,7 +6,7 @@
 //! matrices of rank F, B·V·Vᵀ then predicts the outputs with the least squared error.
 //!
 //! The features are x·B·V, in the outputs' unit. Principal components would also spend directions on
-//! common changes of the readings that no output needs. `docs/features.md` has measurements.
+//! common changes of the readings that no output needs. `docs/training.md` has measurements.
 //!
 //! Few outputs have few such directions, and readings tell more of them than any linear map: where a contact is, is a
 //! ratio of sums. So with fewer outputs than features, their products are regressed on as well.

@@ -3,7 +3,7 @@
 //! Outputs are of two kinds. *Places* are told by the shape alone. *Amounts*, which scale with the touch, are learnt as
 //! multiples of its strength S. A network for each kind has a projection, centres and weights of its own. Frames count by
 //! what they can tell: errors of amounts are those of the outputs themselves, and errors of places weigh little where a
-//! touch is weak. `docs/features.md` has measurements.
+//! touch is weak. `docs/training.md` has measurements.
 
 use std::borrow::Cow;
 use std::fmt::{self, Display};

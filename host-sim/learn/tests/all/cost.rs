@@ -80,8 +80,8 @@ fn counted_frames_are_predicted_to_a_tenth() {
 
 #[test]
 fn a_filter_takes_what_its_page_says() {
-    let page = include_str!("../../../../docs/filter.md");
+    let page = include_str!("../../../../docs/rate.md");
     let cost = Cost::of_filter(ModelShape { outputs: 18, rows: 8, ..PAPER });
     let line = format!("144 outputs take {:.0} µs", cost.cycles as f64 / 180.0);
-    assert!(page.contains(&line), "docs/filter.md should say\n{line}");
+    assert!(page.contains(&line), "docs/rate.md should say\n{line}");
 }
