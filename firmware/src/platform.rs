@@ -9,8 +9,8 @@ pub trait Line {
     /// Receives the next byte from the other end, if one has arrived.
     fn receive(&mut self) -> Option<u8>;
 
-    /// Queues a byte for the other end; returns `false` if there is no room.
-    fn send(&mut self, byte: u8) -> bool;
+    /// Queues bytes for the other end, from the first on; returns how many of them there was room for.
+    fn send(&mut self, bytes: &[u8]) -> usize;
 }
 
 /// Clocks that never stop, and wrap around to 0 after their largest values.

@@ -45,8 +45,8 @@ impl Line for Nucleo {
         self.serial.try_read()
     }
 
-    fn send(&mut self, byte: u8) -> bool {
-        self.serial.try_write(byte)
+    fn send(&mut self, bytes: &[u8]) -> usize {
+        self.serial.try_write(bytes)
     }
 }
 

@@ -4,12 +4,9 @@
 //! piece at a time: an interrupt at the end takes the next one from a queue. So a report is sent while the next frame is
 //! decoded, which may take milliseconds.
 
-use core::cell::UnsafeCell;
-use core::sync::atomic::{AtomicU8, Ordering, fence};
+use core::sync::atomic::{AtomicU8, AtomicUsize, Ordering, fence};
 
 use cortex_m::peripheral::NVIC;
-use heapless::Vec;
-use heapless::spsc::{Consumer, Producer, Queue};
 use stm32f4xx_hal::gpio::{PA2, PA3};
 use stm32f4xx_hal::pac::{DMA1, Interrupt, USART2, interrupt};
 use stm32f4xx_hal::prelude::*;
@@ -27,7 +24,7 @@ pub const BAUD: u32 = match option_env!("TAXEL_BAUD") {
     },
 };
 
-/// Places of the ring of received bytes, and of the queue of those to send; one stays free. DMA does not wait while the ring is
+/// Places of the rings of bytes that are received and to be sent, a power of two; one stays free. DMA does not wait while the ring is
 /// full: what a host sends beyond, without an answer, takes the place of older bytes. The link's checksum detects that.
 const ROOM: usize = 1024;
 
@@ -43,14 +40,14 @@ const CIRCULAR: u32 = 1 << 8;
 /// The ring of received bytes, which DMA writes.
 static RING: [AtomicU8; ROOM] = [const { AtomicU8::new(0) }; ROOM];
 
-/// The end of the queue that is filled before the interrupt is enabled, and then belongs to it.
-struct OfInterrupt(UnsafeCell<Option<Consumer<'static, u8>>>);
+/// The ring of bytes to send, which DMA reads; the place behind the last byte, which [`Serial`] moves on; and that of the first
+/// one that DMA has not sent yet, which the interrupt moves on.
+static TO_SEND: [AtomicU8; ROOM] = [const { AtomicU8::new(0) }; ROOM];
+static QUEUED: AtomicUsize = AtomicUsize::new(0);
+static SENT_UP_TO: AtomicUsize = AtomicUsize::new(0);
 
-// SAFETY: `Serial::start` fills the place once, and from then on only the interrupt uses it, which does not interrupt
-// itself.
-unsafe impl Sync for OfInterrupt {}
-
-static WAITING: OfInterrupt = OfInterrupt(UnsafeCell::new(None));
+/// Most bytes that DMA sends at once: the room of a piece is free at its end.
+const PIECE: usize = 128;
 
 /// The registers of the port and of DMA.
 fn registers() -> (USART2, DMA1) {
@@ -63,25 +60,20 @@ pub struct Serial {
     dma: DMA1,
     /// Place of the next byte to read.
     next: usize,
-    to_send: Producer<'static, u8>,
 }
 
 impl Serial {
     pub(crate) fn start(usart: USART2, dma: DMA1, pins: (PA2, PA3), rcc: &mut Rcc) -> Option<Self> {
-        let queue = cortex_m::singleton!(: Queue<u8, ROOM> = Queue::new())?;
-        let (to_send, waiting) = queue.split();
         let config = Config::default().baudrate(BAUD.bps()).dma(DmaConfig::TxRx);
         usart.serial::<u8>(pins, config, rcc).ok()?;
         DMA1::enable(rcc);
         let fields = OF_USART_2 | COUNT_UP | CIRCULAR;
-        // SAFETY: the ring is atomic, as others write it. The singleton above exists once, so this is reached once, and the
-        // interrupt is still disabled. No critical section depends on its mask.
+        // SAFETY: the ring is atomic, as others write it. No critical section depends on the interrupt's mask.
         unsafe {
             dma::start(dma.st(RECEIVED), &raw const RING, data(), ROOM, fields);
-            *WAITING.0.get() = Some(waiting);
             NVIC::unmask(Interrupt::DMA1_STREAM6);
         }
-        Some(Self { dma, next: 0, to_send })
+        Some(Self { dma, next: 0 })
     }
 
     /// The next byte received, or `None` if there is none yet.
@@ -96,19 +88,28 @@ impl Serial {
         Some(byte)
     }
 
-    /// Queues `byte` for sending; returns `false`, and does nothing, while the queue is full.
-    #[must_use]
-    pub fn try_write(&mut self, byte: u8) -> bool {
-        let taken = self.to_send.enqueue(byte).is_ok();
+    /// Queues bytes for sending, from the first on; returns how many there was room for.
+    pub fn try_write(&mut self, bytes: &[u8]) -> usize {
+        let mut queued = QUEUED.load(Ordering::Relaxed);
+        let waiting = queued.wrapping_sub(SENT_UP_TO.load(Ordering::Acquire)) % ROOM;
+        let bytes = bytes.get(..ROOM - 1 - waiting).unwrap_or(bytes);
+        for byte in bytes {
+            if let Some(place) = TO_SEND.get(queued) {
+                place.store(*byte, Ordering::Relaxed);
+            }
+            queued = (queued + 1) % ROOM;
+        }
+        QUEUED.store(queued, Ordering::Release);
         if !is_sending() {
             NVIC::pend(Interrupt::DMA1_STREAM6);
         }
-        taken
+        bytes.len()
     }
 
     /// Whether all queued bytes have been sent, to the last bit.
     pub fn has_sent_all(&self) -> bool {
-        self.to_send.is_empty() && !is_sending() && registers().0.sr().read().tc().bit()
+        let is_empty = SENT_UP_TO.load(Ordering::Relaxed) == QUEUED.load(Ordering::Relaxed);
+        is_empty && !is_sending() && registers().0.sr().read().tc().bit()
     }
 }
 
@@ -125,27 +126,24 @@ fn is_sending() -> bool {
 /// Begins the next piece of what waits, if DMA has sent the one before.
 #[interrupt]
 fn DMA1_STREAM6() {
-    static mut PIECE: Vec<u8, 128> = Vec::new();
-    // SAFETY: only this interrupt uses the place.
-    let Some(waiting) = (unsafe { &mut *WAITING.0.get() }) else { return };
+    // Number of bytes of the piece that DMA sends, or has sent.
+    static mut SENDING: usize = 0;
     if is_sending() {
         return;
     }
-    PIECE.clear();
-    while !PIECE.is_full()
-        && let Some(byte) = waiting.dequeue()
-    {
-        let _ = PIECE.push(byte);
-    }
+    let first = (SENT_UP_TO.load(Ordering::Relaxed) + *SENDING) % ROOM;
+    SENT_UP_TO.store(first, Ordering::Release);
+    let waiting = QUEUED.load(Ordering::Acquire).wrapping_sub(first) % ROOM;
+    *SENDING = waiting.min(ROOM - first).min(PIECE);
     let (usart, dma) = registers();
     // SAFETY: writing ones clears the flags of DMA, and leaves those of the port: only "all sent" is cleared, which DMA does
-    // not. The piece stays as it is until DMA has ended.
+    // not. Nobody writes to the piece before it counts as sent.
     unsafe {
         dma.hifcr().write(|w| w.bits(0x3D << 16));
-        if !PIECE.is_empty() {
+        if let Some(place) = TO_SEND.get(first).filter(|_| *SENDING > 0) {
             usart.sr().write(|w| w.bits(!(1 << 6)));
             let fields = OF_USART_2 | FROM_MEMORY | COUNT_UP | INTERRUPT;
-            dma::start(dma.st(SENT), PIECE.as_ptr(), data(), PIECE.len(), fields);
+            dma::start(dma.st(SENT), place, data(), *SENDING, fields);
         }
     }
 }

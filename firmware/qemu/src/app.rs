@@ -71,8 +71,8 @@ impl Line for Board {
         self.mailbox.try_read()
     }
 
-    fn send(&mut self, byte: u8) -> bool {
-        self.mailbox.try_write(byte)
+    fn send(&mut self, bytes: &[u8]) -> usize {
+        bytes.iter().take_while(|byte| self.mailbox.try_write(**byte)).count()
     }
 }
 

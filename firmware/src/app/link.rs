@@ -99,28 +99,35 @@ impl<'m, P: Line + Clock> Link<'m, P> {
         let Some(bytes) = packet::encode(number, report, self.buffer) else { return false };
         let platform = &mut self.platform;
         let (start_us, left_us) = (platform.now_us(), self.left_us);
-        let mut send = |byte| send_in_time(platform, byte, start_us, left_us);
-        let sent = (!self.cut || send(cobs::END)) && cobs::encode(bytes, send);
+        let mut send = |bytes: &[u8]| send_in_time(platform, bytes, start_us, left_us);
+        let sent = (!self.cut || send(&[cobs::END])) && cobs::encode(bytes, send);
         self.cut = !sent;
         self.left_us = left_us.saturating_sub(self.platform.now_us().wrapping_sub(start_us));
         sent
     }
 }
 
-fn send_in_time<P: Line + Clock>(platform: &mut P, byte: u8, start_us: u32, left_us: u32) -> bool {
-    if platform.send(byte) {
-        return true;
-    }
-    let stall_start_us = platform.now_us();
+/// Sends all bytes, unless the other end takes none for [`STALL_US`], or the time is over; returns whether it did.
+fn send_in_time<P: Line + Clock>(
+    platform: &mut P,
+    mut bytes: &[u8],
+    start_us: u32,
+    left_us: u32,
+) -> bool {
+    let mut stall_start_us = None;
     loop {
-        let now_us = platform.now_us();
-        if now_us.wrapping_sub(stall_start_us) >= STALL_US
-            || now_us.wrapping_sub(start_us) >= left_us
-        {
-            return false;
-        }
-        if platform.send(byte) {
+        let taken = platform.send(bytes);
+        bytes = bytes.get(taken..).unwrap_or_default();
+        if bytes.is_empty() {
             return true;
+        }
+        let now_us = platform.now_us();
+        if taken > 0 {
+            stall_start_us = None;
+        }
+        let stalled_us = now_us.wrapping_sub(*stall_start_us.get_or_insert(now_us));
+        if stalled_us >= STALL_US || now_us.wrapping_sub(start_us) >= left_us {
+            return false;
         }
     }
 }

@@ -9,22 +9,22 @@ const LONGEST_RUN: usize = 254;
 /// The byte that ends every frame, and does not occur within one.
 pub const END: u8 = 0;
 
-/// Calls `send` with every byte of the frame of `message`, [`END`] included, until it returns `false`;
-/// returns whether all bytes were sent.
-pub fn encode(message: &[u8], mut send: impl FnMut(u8) -> bool) -> bool {
+/// Calls `send` with the frame of `message` piece by piece, [`END`] included, until it returns `false`; returns whether all
+/// pieces were sent.
+pub fn encode(message: &[u8], mut send: impl FnMut(&[u8]) -> bool) -> bool {
     let mut rest = message;
     loop {
         let window = rest.get(..LONGEST_RUN).unwrap_or(rest);
         let zero = window.iter().position(|byte| *byte == END);
         let run = zero.and_then(|length| window.get(..length)).unwrap_or(window);
         // The sum is at most 254 + 1.
-        if !send(run.len() as u8 + 1) || !run.iter().all(|byte| send(*byte)) {
+        if !send(&[run.len() as u8 + 1]) || !send(run) {
             return false;
         }
         let used = run.len() + usize::from(zero.is_some());
         rest = rest.get(used..).unwrap_or_default();
         if rest.is_empty() && zero.is_none() {
-            return send(END);
+            return send(&[END]);
         }
     }
 }
@@ -96,8 +96,8 @@ pub(super) mod tests {
 
     pub fn frame_of(message: &[u8]) -> Vec<u8> {
         let mut frame = Vec::new();
-        assert!(encode(message, |byte| {
-            frame.push(byte);
+        assert!(encode(message, |piece| {
+            frame.extend_from_slice(piece);
             true
         }));
         frame

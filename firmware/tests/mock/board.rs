@@ -83,22 +83,23 @@ impl Line for Board {
         self.pins.borrow_mut().to_device.pop_front()
     }
 
-    fn send(&mut self, byte: u8) -> bool {
+    /// Takes one byte in each gap, if there is one, and as many as there is room for.
+    fn send(&mut self, bytes: &[u8]) -> usize {
         let mut pins = self.pins.borrow_mut();
         if pins.now_us.wrapping_sub(pins.taken_us) < pins.gap_us {
-            return false;
+            return 0;
         }
         pins.taken_us = pins.now_us;
-        match &mut pins.room {
-            Some(0) => return false,
-            Some(room) => *room -= 1,
-            None => {}
+        let mut taken = if pins.gap_us > 0 { 1 } else { bytes.len() };
+        if let Some(room) = &mut pins.room {
+            taken = taken.min(*room);
+            *room -= taken;
         }
         if pins.to_host.is_empty() {
             pins.signal_at_first_byte = pins.signal;
         }
-        pins.to_host.push(byte);
-        true
+        pins.to_host.extend_from_slice(&bytes[..taken]);
+        taken
     }
 }
 

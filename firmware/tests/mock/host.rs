@@ -40,8 +40,8 @@ pub fn request_bytes(number: u16, request: &Request<'_>) -> Vec<u8> {
 /// A packet as bytes on the line.
 pub fn framed(packet: &[u8]) -> Vec<u8> {
     let mut bytes = Vec::new();
-    assert!(cobs::encode(packet, |byte| {
-        bytes.push(byte);
+    assert!(cobs::encode(packet, |piece| {
+        bytes.extend_from_slice(piece);
         true
     }));
     bytes

@@ -302,8 +302,8 @@ pub fn request_bytes(number: u16, request: &Request<'_>) -> Result<Vec<u8>> {
 /// A packet as bytes on the line.
 fn framed(packet: &[u8]) -> Vec<u8> {
     let mut bytes = Vec::with_capacity(packet.len() + 8);
-    cobs::encode(packet, |byte| {
-        bytes.push(byte);
+    cobs::encode(packet, |piece| {
+        bytes.extend_from_slice(piece);
         true
     });
     bytes

@@ -249,8 +249,8 @@ fn liar(frames: &'static [(u32, u64, usize)]) -> String {
             let mut send = |number, report: &Report<'_>| {
                 let mut buffer = [0; 1024];
                 let mut bytes = Vec::new();
-                cobs::encode(packet::encode(number, report, &mut buffer).unwrap(), |byte| {
-                    bytes.push(byte);
+                cobs::encode(packet::encode(number, report, &mut buffer).unwrap(), |piece| {
+                    bytes.extend_from_slice(piece);
                     true
                 });
                 far.write_all(&bytes).unwrap();

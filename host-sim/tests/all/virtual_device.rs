@@ -113,14 +113,16 @@ impl<W: Read + Write, N: FnMut()> platform::Line for Board<'_, W, N> {
         self.spoil(byte)
     }
 
-    fn send(&mut self, byte: u8) -> bool {
-        if let Some(byte) = self.spoil(byte) {
-            self.to_send.push(byte);
+    fn send(&mut self, bytes: &[u8]) -> usize {
+        for byte in bytes {
+            if let Some(byte) = self.spoil(*byte) {
+                self.to_send.push(byte);
+            }
+            if *byte == 0 {
+                self.flush();
+            }
         }
-        if byte == 0 {
-            self.flush();
-        }
-        true
+        bytes.len()
     }
 }
 

@@ -122,8 +122,8 @@ impl Life<'_, '_, '_> {
                 same_again!(Request<'_>, &packet);
                 same_again!(Report<'_>, &packet);
                 let mut line = Vec::new();
-                cobs::encode(&packet, |byte| {
-                    line.push(byte);
+                cobs::encode(&packet, |piece| {
+                    line.extend_from_slice(piece);
                     true
                 });
                 self.send(line)

@@ -40,8 +40,8 @@ fn estimate_bytes(rows: usize, outputs: usize) -> usize {
     let mut buffer = vec![0; 100 + rows + 4 * outputs.len()];
     let message = packet::encode(packet::UNASKED, &report, &mut buffer).unwrap_or_default();
     let mut bytes = 0;
-    cobs::encode(message, |_| {
-        bytes += 1;
+    cobs::encode(message, |piece| {
+        bytes += piece.len();
         true
     });
     bytes
