@@ -107,7 +107,7 @@ const MOST_OHM: f32 = 1e6;
 /// let counts = |v: f32| v / 3.3 * 4096.0;
 /// let mut reading = [counts(1.992)];
 /// let row = ScannedRow { row: RowWire(0), columns: ColumnWires::first(1), load: 1.0 };
-/// circuit.row_ohm(row, &[counts(0.2)], 4095, &mut reading);
+/// circuit.row_ohm(row, &[counts(0.2)], &circuit.scale(4095), &mut reading);
 /// assert!((reading[0] - 62.5).abs() < 1e-3);
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -128,6 +128,15 @@ pub struct ZeroPotential<const ROWS: usize, const COLS: usize> {
     pub series_ohm: [f32; COLS],
 }
 
+/// What counts of a converter mean in a circuit.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Scale<const COLS: usize> {
+    /// Current in A of a count, in each column.
+    pub ampere_per_count: [f32; COLS],
+    /// Counts from which on an op-amp may be saturated.
+    pub saturated_counts: f32,
+}
+
 impl<const ROWS: usize, const COLS: usize> ZeroPotential<ROWS, COLS> {
     /// Typical constants: 0.2 V and 560 Ω (3.6 mA a column, 65 mA a row, readings from 36 Ω), and a switch of 0.26
     /// Ω. At 5.5 mA an MCP6024 at 3.3 V is sure to reach 3.1 V.
@@ -141,32 +150,30 @@ impl<const ROWS: usize, const COLS: usize> ZeroPotential<ROWS, COLS> {
         series_ohm: [0.0; COLS],
     };
 
+    /// What counts of a converter mean whose largest one is `full_scale_counts`.
+    pub fn scale(&self, full_scale_counts: u16) -> Scale<COLS> {
+        let volt_per_count = self.reference_v / (f32::from(full_scale_counts) + 1.0);
+        Scale {
+            ampere_per_count: self.feedback_ohm.map(|r| volt_per_count / r),
+            saturated_counts: self.saturated_v / volt_per_count,
+        }
+    }
+
     /// Converts the samples of a row to Ω, in place.
     ///
-    /// `readings` holds averaged counts of the scanned columns, NaN where none could be taken, and Ω afterwards. `idle`
-    /// holds counts of every column while all rows idle. `full_scale_counts` is the converter's largest count.
-    pub fn row_ohm(
-        &self,
-        row: ScannedRow,
-        idle: &[f32],
-        full_scale_counts: u16,
-        readings: &mut [f32],
-    ) {
-        let volt_per_count = self.reference_v / counts_at_reference(full_scale_counts);
-        let saturated = self.saturated_counts(full_scale_counts);
-        let current = |n: f32, idle: f32, r: f32| (n - idle) * volt_per_count / r;
-        let columns = || row.columns.pick(idle.iter().zip(&self.feedback_ohm));
-        let currents = readings.iter().zip(columns()).map(|(n, (idle, r))| current(*n, *idle, *r));
-        let mut across = self.drive_v - voltage_drop(&self.row_source_ohm, row, currents);
-        // A column-wire at ground, which is saturated at rest too, takes no current from the row.
-        let mut shorts = readings.iter().zip(columns());
-        if shorts.any(|(n, (idle, _))| *n >= saturated && *idle < saturated) {
-            across = f32::NAN;
-        }
-        for (reading, (idle, r)) in readings.iter_mut().zip(columns()) {
-            let n = *reading;
-            *reading = reading_of(n, n - idle, saturated, across / current(n, *idle, *r));
-        }
+    /// `counts` holds averaged counts of every column, NaN where none could be taken, and Ω of the row's columns afterwards.
+    /// `idle` holds counts of every column while all rows idle.
+    pub fn row_ohm(&self, row: ScannedRow, idle: &[f32], scale: &Scale<COLS>, counts: &mut [f32]) {
+        let source = self.row_source_ohm.get(row.row.0);
+        let samples = RowSamples {
+            row,
+            idle,
+            ampere_per_count: &scale.ampere_per_count,
+            saturated_counts: scale.saturated_counts,
+            drive_v: self.drive_v,
+            source_ohm: source.copied().unwrap_or(0.0),
+        };
+        samples.convert(counts);
     }
 
     /// The [`load`](ScannedRow::load) of a row, from the `counts` of every column; what cannot be told is that of equal
@@ -175,20 +182,14 @@ impl<const ROWS: usize, const COLS: usize> ZeroPotential<ROWS, COLS> {
         &self,
         columns: ColumnWires,
         idle: &[f32],
-        full_scale_counts: u16,
+        scale: &Scale<COLS>,
         counts: &[f32],
     ) -> f32 {
-        let saturated = self.saturated_counts(full_scale_counts);
-        if counts.iter().any(|n| *n >= saturated) {
+        if counts.iter().any(|n| *n >= scale.saturated_counts) {
             return f32::NAN;
         }
-        let parts = || counts.iter().zip(idle.iter().zip(&self.feedback_ohm));
-        load(columns, || parts().map(|(n, (idle, r))| (n - idle, (n - idle) / r)))
-    }
-
-    /// Counts from which on an op-amp may be saturated.
-    fn saturated_counts(&self, full_scale_counts: u16) -> f32 {
-        self.saturated_v / (self.reference_v / counts_at_reference(full_scale_counts))
+        let parts = || counts.iter().zip(idle.iter().zip(&scale.ampere_per_count));
+        load(columns, || parts().map(|(n, (idle, per_count))| (n - idle, (n - idle) * per_count)))
     }
 
     /// Corrects a whole `frame` (Ω, rows of `columns` readings) for leads in series with columns: each reading to
@@ -241,23 +242,48 @@ fn copy(from: Floats<'_>, to: &mut [f32]) {
     to.iter_mut().zip(from.iter()).for_each(|(place, number)| *place = number);
 }
 
-/// Counts of the reference voltage itself: one more than the largest count.
-fn counts_at_reference(full_scale_counts: u16) -> f32 {
-    f32::from(full_scale_counts) + 1.0
+/// What turns samples of a row into readings. Its arithmetic is the same for circuits of all sizes, so that this crate
+/// compiles it, for speed.
+struct RowSamples<'a> {
+    row: ScannedRow,
+    /// Idle counts, and current of a count, of all columns.
+    idle: &'a [f32],
+    ampere_per_count: &'a [f32],
+    saturated_counts: f32,
+    drive_v: f32,
+    source_ohm: f32,
 }
 
-/// Voltage drop at the source of a row: R_s·ΣI. A column that could not be sampled counts as the mean of the
-/// others.
-fn voltage_drop(
-    row_source_ohm: &[f32],
-    ScannedRow { row, columns, load }: ScannedRow,
-    currents: impl Iterator<Item = f32>,
-) -> f32 {
-    let source_ohm = row_source_ohm.get(row.0).copied().unwrap_or(0.0);
-    let taken = currents.filter(|i| !i.is_nan());
-    let (count, sum) = taken.fold((0_usize, 0.0), |(count, sum), i| (count + 1, sum + i));
-    let share = columns.count() as f32 / count as f32;
-    if count == 0 { 0.0 } else { source_ohm * sum * (share * load) }
+impl RowSamples<'_> {
+    /// Converts counts to Ω, as [`ZeroPotential::row_ohm`] says.
+    #[inline(never)] // else it would be compiled where it is called, as small as can be
+    fn convert(&self, counts: &mut [f32]) {
+        let ScannedRow { columns, load, .. } = self.row;
+        let mut currents = [f32::NAN; u32::BITS as usize];
+        let (mut missing, mut sum, mut has_short) = (0_usize, 0.0, false);
+        let constants = self.idle.iter().zip(self.ampere_per_count);
+        let samples = counts.iter().zip(&mut currents).zip(constants);
+        for ((n, current), (idle, per_count)) in columns.pick(samples) {
+            *current = (n - idle) * per_count;
+            if current.is_nan() {
+                missing += 1;
+            } else {
+                sum += *current;
+            }
+            // A column-wire at ground, which is saturated at rest too, takes no current from the row.
+            if *n >= self.saturated_counts {
+                has_short |= *idle < self.saturated_counts;
+            }
+        }
+        // A column that could not be sampled counts as the mean of the others.
+        let taken = columns.count().saturating_sub(missing);
+        let share = columns.count() as f32 / taken as f32;
+        let drop_v = if taken == 0 { 0.0 } else { self.source_ohm * sum * (share * load) };
+        let across_v = if has_short { f32::NAN } else { self.drive_v - drop_v };
+        for ((n, current), idle) in counts.iter_mut().zip(currents).zip(self.idle) {
+            *n = reading_of(*n, *n - idle, self.saturated_counts, across_v / current);
+        }
+    }
 }
 
 /// Current of all columns over that of `columns`, from each column's counts due to its current, and the current in any
@@ -318,7 +344,7 @@ mod tests {
     ) -> [f32; N] {
         let mut readings = *sampled;
         let row = ScannedRow { row: RowWire(row), columns: ColumnWires::first(N), load: 1.0 };
-        circuit.row_ohm(row, idle, 4095, &mut readings);
+        circuit.row_ohm(row, idle, &circuit.scale(4095), &mut readings);
         readings
     }
 
@@ -390,16 +416,15 @@ mod tests {
     fn columns_that_are_not_read_load_the_row_by_their_measured_share() {
         let mut circuit = ZeroPotential { row_source_ohm: [9.0, 0.3], ..ZeroPotential::TYPICAL };
         (0..18).for_each(|k| circuit.feedback_ohm[k] -= k as f32);
-        let columns = ColumnWires(1 << 2 | 1 << 8 | 1 << 14);
+        let (columns, scale) = (ColumnWires(1 << 2 | 1 << 8 | 1 << 14), circuit.scale(4095));
         let read = |counts: &[f32; 18], idle: &[f32; 18], load: f32| {
-            let mut readings = [counts[2], counts[8], counts[14]];
-            let scanned = ScannedRow { row: RowWire(1), columns, load };
-            circuit.row_ohm(scanned, idle, 4095, &mut readings);
-            let error = |(ohm, k): (f32, usize)| (f64::from(ohm) / row()[k] - 1.0).abs();
-            readings.into_iter().zip([2, 8, 14]).map(error).fold(0.0, f64::max)
+            let (mut ohm, scanned) = (*counts, ScannedRow { row: RowWire(1), columns, load });
+            circuit.row_ohm(scanned, idle, &scale, &mut ohm);
+            let error = |k: usize| (f64::from(ohm[k]) / row()[k] - 1.0).abs();
+            [2, 8, 14].map(error).into_iter().fold(0.0, f64::max)
         };
         let [sampled, idle] = zero_potential_counts(&circuit, &row());
-        let load = circuit.load(columns, &idle, 4095, &sampled);
+        let load = circuit.load(columns, &idle, &scale, &sampled);
         assert!(read(&sampled, &idle, load) < 2e-6);
         // Without the others' share readings are 7 % too high; with that of equal columns still a little off.
         assert!(read(&sampled, &idle, 1.0) > 0.05);
@@ -408,18 +433,18 @@ mod tests {
         let (mut missing, mut open) = (sampled, sampled);
         missing[5] = f32::NAN;
         open[5] = idle[5] + 3.0;
-        assert!((circuit.load(columns, &idle, 4095, &missing) / load - 1.0).abs() < 1e-2);
-        let without = circuit.load(columns, &idle, 4095, &open) / load;
+        assert!((circuit.load(columns, &idle, &scale, &missing) / load - 1.0).abs() < 1e-2);
+        let without = circuit.load(columns, &idle, &scale, &open) / load;
         let share = 1.0 / row()[5] / row().iter().map(|ohm| 1.0 / ohm).sum::<f64>();
         assert!((f64::from(without) - (1.0 - share)).abs() < 1e-6, "{without}");
         let mut failed = sampled;
         failed[2] = f32::NAN;
         assert!(read(&failed, &idle, load) < 5e-3, "one that is read could not be sampled");
         // Nothing is known of a row without current.
-        assert_eq!(circuit.load(columns, &idle, 4095, &idle), 6.0);
+        assert_eq!(circuit.load(columns, &idle, &scale, &idle), 6.0);
         // Nor of one with a short.
         missing[5] = 4000.0;
-        assert!(circuit.load(columns, &idle, 4095, &missing).is_nan());
+        assert!(circuit.load(columns, &idle, &scale, &missing).is_nan());
     }
 
     #[test]

@@ -58,8 +58,8 @@ const ONCHIP_END_TICKS: u32 = 16;
 /// next one starts. From the cycles of the emulated board.
 pub const ONCHIP_SUMS_US: u32 = 61;
 
-/// Time in µs that it then takes to turn the sums into Ω, while the next scan runs.
-pub const ONCHIP_READINGS_US: u32 = 200;
+/// Time in µs that it then takes to turn the sums into Ω, while the next scan runs. Counted in QEMU: `cargo xtask cycles`.
+pub const ONCHIP_READINGS_US: u32 = 160;
 
 /// Ticks of the processor's clock from one trigger of the on-chip converters to the next.
 pub const ONCHIP_TRIGGER_TICKS: u16 = (ONCHIP_TRIGGER_CYCLES * ONCHIP_TICKS_A_CYCLE) as u16;

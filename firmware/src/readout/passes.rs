@@ -67,11 +67,10 @@ pub struct PassScanner<'m, Q, const ROWS: usize, const LINES: usize, const COLUM
 }
 
 /// What a scan drives and is asked for.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 struct Plan<const LINES: usize> {
     /// A row each, or none.
-    lines: [Option<RowWire>; LINES],
-    line_count: usize,
+    lines: heapless::Vec<Option<RowWire>, LINES>,
     columns: ColumnWires,
     settings: ScanSettings,
     has_failed: bool,
@@ -79,16 +78,11 @@ struct Plan<const LINES: usize> {
 
 impl<const LINES: usize> Plan<LINES> {
     const NOTHING: Self = Self {
-        lines: [None; LINES],
-        line_count: 0,
+        lines: heapless::Vec::new(),
         columns: ColumnWires(0),
         settings: ScanSettings { settling_us: 0, oversampling: 0 },
         has_failed: true,
     };
-
-    fn lines(&self) -> &[Option<RowWire>] {
-        self.lines.get(..self.line_count).unwrap_or_default()
-    }
 }
 
 impl<'m, Q: Sequencer<COLUMNS>, const ROWS: usize, const LINES: usize, const COLUMNS: usize>
@@ -117,28 +111,31 @@ impl<'m, Q: Sequencer<COLUMNS>, const ROWS: usize, const LINES: usize, const COL
     fn start_pass(&mut self) {
         let samples = self.samples_left.min(Q::MOST_SAMPLES);
         self.samples_left -= samples;
-        let Plan { settings, .. } = self.started;
-        self.sequencer.start(self.started.lines(), settings.settling_us, samples);
+        let Plan { lines, settings, .. } = &self.started;
+        self.sequencer.start(lines, settings.settling_us, samples);
     }
 
     /// Turns the sums into readings in Ω. Returns how many were taken.
     fn convert(&mut self, frame: &mut [f32]) -> usize {
         let Plan { columns, settings, .. } = self.ended;
         let (samples, all) = (f32::from(settings.oversampling), ColumnWires::first(COLUMNS));
-        let lines = self.ended.lines().iter().zip(self.sums.iter());
+        let lines = self.ended.lines.iter().zip(self.sums.iter());
         let mut readings = frame.chunks_mut(columns.count().max(1));
-        let mut taken = 0;
+        let (scale, mut taken) = (self.circuit.scale(Q::FULL_SCALE_COUNTS), 0);
         for (line, sums) in lines {
-            let mut counts = sums.map(|sum| sum as f32 / samples);
+            let mut counts = [0.0; COLUMNS];
+            for (counts, sum) in counts.iter_mut().zip(sums) {
+                *counts = *sum as f32 / samples;
+            }
             let Some(row) = *line else {
                 self.idle = counts;
                 continue;
             };
             let row = ScannedRow { row, columns: all, load: 1.0 };
-            self.circuit.row_ohm(row, &self.idle, Q::FULL_SCALE_COUNTS, &mut counts);
-            let picked = columns.pick(counts);
+            self.circuit.row_ohm(row, &self.idle, &scale, &mut counts);
+            let picked = columns.pick(&counts);
             for (reading, ohm) in readings.next().unwrap_or_default().iter_mut().zip(picked) {
-                *reading = ohm;
+                *reading = *ohm;
                 taken += 1;
             }
         }
@@ -182,10 +179,9 @@ impl<Q: Sequencer<COLUMNS>, const ROWS: usize, const LINES: usize, const COLUMNS
         let begins_round = self.scans_left == 0;
         let idle = begins_round.then_some(None);
         let lines = idle.into_iter().chain(wires.rows.iter().map(|row| Some(*row)));
-        plan.line_count = 0;
-        for (place, line) in plan.lines.iter_mut().zip(lines) {
-            *place = line;
-            plan.line_count += 1;
+        plan.lines.clear();
+        for line in lines.take(LINES) {
+            let _ = plan.lines.push(line);
         }
         self.scans_left = if begins_round { SCANS_A_ROUND } else { self.scans_left } - 1;
         self.samples_left = settings.oversampling;
@@ -197,14 +193,14 @@ impl<Q: Sequencer<COLUMNS>, const ROWS: usize, const LINES: usize, const COLUMNS
             self.sums.as_flattened_mut().fill(0);
             self.has_ended = false;
         }
-        let sums = self.sums.get_mut(..self.started.line_count).unwrap_or_default();
+        let sums = self.sums.get_mut(..self.started.lines.len()).unwrap_or_default();
         let Some(outcome) = self.sequencer.poll(sums) else { return false };
         if outcome.is_ok() && self.samples_left > 0 {
             self.start_pass();
             return false;
         }
         self.started.has_failed = outcome.is_err();
-        (self.ended, self.has_ended) = (self.started, true);
+        (self.ended, self.has_ended) = (self.started.clone(), true);
         if outcome.is_err() {
             self.scans_left = 0;
         }
@@ -217,9 +213,9 @@ impl<Q: Sequencer<COLUMNS>, const ROWS: usize, const LINES: usize, const COLUMNS
         }
         frame.fill(f32::NAN); // rows and columns that are not wired
         let taken = self.convert(frame);
-        let Plan { line_count, settings, .. } = self.ended;
-        let mut row_times = self.sequencer.line_times(line_count, settings);
-        if self.ended.lines().first() == Some(&None) {
+        let Plan { lines, settings, .. } = &self.ended;
+        let mut row_times = self.sequencer.line_times(lines.len(), *settings);
+        if lines.first() == Some(&None) {
             row_times.first_us += row_times.step_us;
         }
         let mut report = ScanReport { row_times, ..ScanReport::default() };

@@ -102,20 +102,22 @@ impl<D: RowDrive, S: ColumnSampler, T: DelayNs, const ROWS: usize, const COLUMNS
         }
         settle(&mut self.delay, self.settings);
         let mut counts = [f32::NAN; COLUMNS];
-        let (samples, full_scale) = (self.settings.oversampling, S::FULL_SCALE_COUNTS);
+        let samples = self.settings.oversampling;
+        let scale = self.circuit.scale(S::FULL_SCALE_COUNTS);
         sample_columns(&mut self.sampler, samples, columns, &mut counts, report);
-        for (reading, counts) in readings.iter_mut().zip(columns.pick(&counts)) {
-            *reading = *counts;
-        }
         let mut load = 1.0;
         if let Some(known) = self.load.get_mut(row.0).filter(|_| columns != all) {
             if is_its_turn || known.is_nan() {
                 sample_others(&mut self.sampler, samples, columns, &mut counts);
-                *known = self.circuit.load(columns, &self.idle, full_scale, &counts);
+                *known = self.circuit.load(columns, &self.idle, &scale, &counts);
             }
             load = *known;
         }
-        self.circuit.row_ohm(ScannedRow { row, columns, load }, &self.idle, full_scale, readings);
+        let row = ScannedRow { row, columns, load };
+        self.circuit.row_ohm(row, &self.idle, &scale, &mut counts);
+        for (reading, ohm) in readings.iter_mut().zip(columns.pick(&counts)) {
+            *reading = *ohm;
+        }
     }
 }
 

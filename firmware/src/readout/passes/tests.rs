@@ -112,7 +112,7 @@ fn a_scan_by_passes_is_what_the_circuit_makes_of_the_same_counts() {
         for row in BOTH {
             let mut ohm = [0, 1, 2].map(|column| table.borrow().counts[row.0][column] as f32);
             let scanned = ScannedRow { row, columns: ColumnWires::first(3), load: 1.0 };
-            CIRCUIT.row_ohm(scanned, &[248.0, 249.0, 250.0], 4095, &mut ohm);
+            CIRCUIT.row_ohm(scanned, &[248.0, 249.0, 250.0], &CIRCUIT.scale(4095), &mut ohm);
             expected.extend(wires.columns.pick(ohm));
         }
         CIRCUIT.correct(wires.columns, &mut expected);
