@@ -157,6 +157,11 @@ impl State {
             .is_some_and(|left_us| (1..=PAUSE_US).contains(&left_us))
     }
 
+    /// Depth of the contact in mm at its deepest, 0 without one.
+    pub fn depth_mm(&self) -> f32 {
+        if self.is_known { self.now.mean[2].max(0.0) } else { 0.0 }
+    }
+
     /// Place of the contact along x and y in mm, and the standard deviation of it; `None` while there is no contact.
     pub fn place_mm(&self) -> Option<([f32; 2], f32)> {
         let Contact { mean: [x, y, ..], root: [of_x, of_y, ..], .. } = &self.now;
@@ -209,15 +214,10 @@ impl<'a> Tracker<'a> {
         self.sizes
     }
 
-    /// Corrects the `state` by the next frame, and writes outputs to the `estimate` if the state explains the frame. Returns
-    /// whether it does: else a network must decode the frame, for [`start`](Self::start).
+    /// Corrects the `state` by the next frame. Returns whether it explains the frame, so that [`write`](Self::write) has its
+    /// estimate: else a network must decode the frame, for [`start`](Self::start).
     #[inline(never)] // so that others' work finds the stack free
-    pub fn follow(
-        &self,
-        state: &mut State,
-        frame: &Frame<'_>,
-        estimate: &mut Estimate<'_>,
-    ) -> bool {
+    pub fn follow(&self, state: &mut State, frame: &Frame<'_>) -> bool {
         let settings = &self.settings();
         let at_us = frame.middle().1;
         state.followed = None;
@@ -239,13 +239,13 @@ impl<'a> Tracker<'a> {
             form.for_each(|(latent, before)| *latent = before);
         }
         *followed = Some(Followed { gap_s, residual });
-        self.is_explained(residual, now.level) && self.finish(settings, state, frame, estimate)
+        self.is_explained(residual, now.level) && self.finish(state)
     }
 
-    /// Starts a contact from a network's `estimate` of a frame that [`follow`](Self::follow) did not explain, and writes
-    /// outputs over it if that does, or explains the frame better than the contact before. Returns whether it wrote them.
+    /// Starts a contact from a network's `estimate` of a frame that [`follow`](Self::follow) did not explain, unless the contact
+    /// before explains it better. Returns whether one of them does, so that [`write`](Self::write) has a better estimate.
     #[inline(never)]
-    pub fn start(&self, state: &mut State, frame: &Frame<'_>, estimate: &mut Estimate<'_>) -> bool {
+    pub fn start(&self, state: &mut State, frame: &Frame<'_>, estimate: &Estimate<'_>) -> bool {
         if state.is_paused(frame.middle().1) {
             return false;
         }
@@ -260,23 +260,27 @@ impl<'a> Tracker<'a> {
             mem::swap(now, other);
             before.residual = residual;
         }
-        self.finish(settings, state, frame, estimate)
+        self.finish(state)
     }
 
-    /// Follows a frame of which the `estimate` is a network's already, or else starts from it. Returns whether outputs are the
-    /// tracker's.
-    pub fn track(&self, state: &mut State, frame: &Frame<'_>, estimate: &mut Estimate<'_>) -> bool {
-        self.follow(state, frame, estimate) || self.start(state, frame, estimate)
-    }
-
-    /// Learns the level of residuals from a frame, and writes its outputs if it is explained. Returns whether it is.
-    fn finish(
+    /// Follows a frame of which the `estimate` is a network's already, or else starts from it; [writes](Self::write) over the
+    /// estimate if it is explained. Returns whether it is.
+    pub fn track(
         &self,
-        settings: &Settings,
         state: &mut State,
         frame: &Frame<'_>,
+        ahead_us: f32,
         estimate: &mut Estimate<'_>,
     ) -> bool {
+        let is_explained = self.follow(state, frame) || self.start(state, frame, estimate);
+        if is_explained {
+            self.write(state, ahead_us, estimate);
+        }
+        is_explained
+    }
+
+    /// Learns the level of residuals from a frame. Returns whether it is explained.
+    fn finish(&self, state: &mut State) -> bool {
         let State { now, is_known, followed, .. } = state;
         let Some(Followed { gap_s, residual }) = followed.take() else { return false };
         *is_known = residual.is_finite() && now.mean.iter().all(|number| number.is_finite());
@@ -287,10 +291,7 @@ impl<'a> Tracker<'a> {
         let learnt = learnt_level(now.level, residual, gap_s, now.frames);
         (now.level, now.frames) =
             (learnt.clamp(LEVELS[0], LEVELS[1]), now.frames.saturating_add(1));
-        if is_explained {
-            let ahead_s = (frame.ahead_us - frame.middle().0) * 1e-6;
-            self.write(&settings.mean_after(&now.mean, ahead_s), estimate);
-        } else {
+        if !is_explained {
             state.paused_until_us = now.at_us.saturating_add(PAUSE_US);
         }
         is_explained
@@ -394,9 +395,12 @@ impl<'a> Tracker<'a> {
         axes.unwrap_or(0).max(1)
     }
 
-    /// Writes the deformation of every electrode.
-    fn write(&self, mean: &Vector, estimate: &mut Estimate<'_>) {
-        let mut latents = *walk::latents(mean);
+    /// Writes the deformation of every electrode that is expected `ahead_us` after the [middle](Frame::middle) of the frame
+    /// that was explained last.
+    #[inline(never)]
+    pub fn write(&self, state: &State, ahead_us: f32, estimate: &mut Estimate<'_>) {
+        let mean = self.settings().mean_after(&state.now.mean, ahead_us * 1e-6);
+        let mut latents = *walk::latents(&mean);
         latents[2] = latents[2].max(0.0);
         let (form, axes) = (Form::new(latents), self.axes(estimate));
         for (outputs, place) in estimate.outputs.chunks_exact_mut(axes).zip(self.places_mm) {

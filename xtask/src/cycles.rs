@@ -30,11 +30,14 @@ const DATA: &str = "firmware/cycles.csv";
 /// First line of the accepted figures.
 const HEAD: &str = "compiler,model,scope,instructions,predicted";
 
+/// Scope of decoding a frame by a network.
+const FRAME: &str = "frame";
+
 /// Scope of the filter in time of a frame's estimate.
 const FILTER: &str = "filter";
 
-/// Scope of following a contact, a frame each millisecond.
-const TRACK: &str = "track";
+/// Scope of following a contact, a frame each millisecond; what a board does besides with such a frame is not predicted.
+const FOLLOW: &str = "follow";
 
 /// Most per cent by which a prediction may be off.
 const PREDICTED_PERCENT: u64 = 10;
@@ -54,7 +57,7 @@ pub struct Options {
 #[derive(Debug, Clone, PartialEq, Eq)]
 struct Figure {
     model: String,
-    /// What is counted: a frame, or the filter in time of its estimate.
+    /// What is counted.
     scope: String,
     instructions: u64,
     predicted: u64,
@@ -93,12 +96,12 @@ fn measure(model: &Model, image: &Image, files: &Files) -> Outcome<Vec<Figure>> 
     let design = Design::new(&model.blob);
     let nothing = Cost { instructions: 0, cycles: 0 };
     let figure = |(scope, instructions): (String, u64)| {
+        let tracker = model.blob.parse().tracker();
         let predicted = match scope.as_str() {
             FILTER => Cost::of_filter(design.shape),
-            TRACK => {
-                model.blob.parse().tracker().map_or(nothing, |it| Cost::of_tracker(it.sizes()))
-            }
-            _ => Cost::of_frame(&design),
+            FRAME => Cost::of_frame(&design),
+            FOLLOW => tracker.map_or(nothing, |it| Cost::of_tracker(it.sizes())),
+            _ => Cost { instructions, ..nothing },
         };
         Figure { model: model.name(), scope, instructions, predicted: predicted.instructions }
     };
@@ -174,10 +177,10 @@ fn data(compiler: &str, figures: &[Figure]) -> String {
 
 /// Table of frames in Markdown.
 fn markdown(figures: &[Figure]) -> String {
-    let line = |Figure { model, instructions, predicted, .. }: &Figure| {
-        format!("| {model} | {instructions} | {predicted} |\n")
+    let line = |Figure { model, scope, instructions, predicted }: &Figure| {
+        format!("| {model} | {scope} | {instructions} | {predicted} |\n")
     };
-    let head = "| model | instructions | predicted |\n|---|--:|--:|\n";
+    let head = "| model | what | instructions | predicted |\n|---|---|--:|--:|\n";
     let frames = figures.iter().filter(|figure| figure.scope != FILTER);
     head.to_owned() + &frames.map(line).collect::<String>()
 }

@@ -69,7 +69,7 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
                     let series = sensor.configuration.frame_period_us == 0;
                     let scan = Scan { start_us, missed: 0, row_times: RowTimes::default() };
                     let scan = series.then_some(scan);
-                    let (mut flags, _) = work.decode(sensor, scan, link, model);
+                    let (mut flags, _) = work.decode(sensor, scan, true, link, model);
                     let novelty = work.assess(sensor.frame(), link, decoder, sent, &mut flags);
                     work.send_estimate(number, (frame, start_us), flags, (novelty, sent), link);
                     None

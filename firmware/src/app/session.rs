@@ -111,7 +111,9 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
         let Self { sensor, link, work, .. } = self;
         let Some((frame, scan)) = sensor.scan_if_due(work.scratch, link) else { return };
         let Scan { start_us, missed, .. } = scan;
-        let (mut flags, health) = work.decode(sensor, Some(scan), link, model);
+        let every = sensor.configuration.report_every;
+        let is_reported = frame.checked_rem(every.into()) == Some(0);
+        let (mut flags, health) = work.decode(sensor, Some(scan), is_reported, link, model);
         let is_touched = flags & EstimateReport::CONTACT != 0;
         work.tell_events(&sensor.configuration, (frame, start_us), is_touched, link);
         let (sent, decoder) = (sensor.configuration.confidence, model.decoder.as_ref());
@@ -121,8 +123,7 @@ impl<P: Platform, F: FrameSource, const ROWS: usize> Core<'_, P, F, ROWS> {
             let readings_ohm = Floats::new(sensor.baseline.mean());
             link.send(number, &Report::Baseline { readings_ohm });
         }
-        let every = sensor.configuration.report_every;
-        if frame.checked_rem(every.into()) != Some(0) {
+        if !is_reported {
             return;
         }
         if !health.is_good() {

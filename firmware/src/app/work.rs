@@ -51,11 +51,13 @@ pub struct Work<'m, const ROWS: usize> {
 
 impl<const ROWS: usize> Work<'_, ROWS> {
     /// Decodes the sensor's frame without its faulty readings, unless the model's tracker explains it: by the network, whose
-    /// estimate passes the filter in time. A frame that is not of a `scan`, one of a series, is decoded by itself.
+    /// estimate passes the filter in time. A frame that is not of a `scan`, one of a series, is decoded by itself. The
+    /// tracker writes outputs only where they are wanted.
     pub fn decode<P: Platform, F: FrameSource>(
         &mut self,
         sensor: &mut Sensor<'_, F, ROWS>,
         scan: Option<Scan>,
+        wants_outputs: bool,
         link: &mut Link<'_, P>,
         model: &InForce<'_, ROWS>,
     ) -> (u8, Health) {
@@ -96,21 +98,18 @@ impl<const ROWS: usize> Work<'_, ROWS> {
             let mut row_us = [0.0; ROWS];
             let tracked = scan.zip(model.tracker).filter(|_| track && has_baseline);
             let tracked = tracked.map(|(scan, tracker)| {
-                let (row_us, middle_us) = row_times(scan, &sensor.wiring, tracker, &mut row_us);
                 let frame = track::Frame {
                     readings_ohm: self.measured,
                     reciprocals: relative_inputs.then_some(&*self.reciprocals),
                     start_us: scan.start_us,
-                    row_us,
-                    ahead_us: middle_us + filter_lead_us as f32,
+                    row_us: row_times(scan, &sensor.wiring, tracker, &mut row_us),
                 };
                 (tracker, frame)
             });
             let contact = &mut *self.contact;
             let mut estimate = cut(&mut self.estimate, self.rows, self.outputs);
             let mut decoded = Ok(false);
-            let mut is_tracked =
-                tracked.is_some_and(|(it, frame)| it.follow(contact, &frame, &mut estimate));
+            let mut is_tracked = tracked.is_some_and(|(it, frame)| it.follow(contact, &frame));
             self.is_followed = is_tracked;
             if !is_tracked {
                 decoded = decoder.decode_into(
@@ -119,7 +118,13 @@ impl<const ROWS: usize> Work<'_, ROWS> {
                     &mut estimate,
                 );
                 is_tracked =
-                    tracked.is_some_and(|(it, frame)| it.start(contact, &frame, &mut estimate));
+                    tracked.is_some_and(|(it, frame)| it.start(contact, &frame, &estimate));
+            }
+            if let Some((tracker, _)) = tracked.filter(|_| is_tracked) {
+                estimate.status.fill(RowStatus::Decoded);
+                if wants_outputs {
+                    tracker.write(contact, filter_lead_us as f32, &mut estimate);
+                }
             }
             if let Some(Scan { start_us, .. }) = scan.filter(|_| !is_tracked) {
                 self.filter.filter(sensor.configuration.filter(), start_us, &mut estimate);
@@ -153,6 +158,7 @@ impl<const ROWS: usize> Work<'_, ROWS> {
     ) {
         let outputs = cut(&mut self.estimate, self.rows, self.outputs).outputs;
         let load = match self.force {
+            _ if self.is_followed => self.contact.depth_mm(),
             Some(place) => outputs.get(place).copied().unwrap_or(f32::NAN),
             None => outputs.iter().copied().fold(0.0, f32::max),
         };
@@ -259,19 +265,19 @@ impl<const ROWS: usize> Work<'_, ROWS> {
     }
 }
 
-/// Fills `row_us` with the times at which the tracker's rows were read; returns them and their mean.
+/// Fills `row_us` with the times at which the tracker's rows were read, and returns them.
 fn row_times<'t, const ROWS: usize>(
     Scan { row_times: RowTimes { first_us, step_us }, .. }: Scan,
     wiring: &Wiring<'_, ROWS>,
     tracker: Tracker<'_>,
     row_us: &'t mut [f32; ROWS],
-) -> (&'t [f32], f32) {
+) -> &'t [f32] {
     let Sizes { rows, columns, .. } = tracker.sizes();
     let row_us = row_us.get_mut(..rows).unwrap_or_default();
     for (row, us) in row_us.iter_mut().enumerate() {
         *us = first_us + step_us * wiring.scanned_row(row.saturating_mul(columns)) as f32;
     }
-    (row_us, row_us.iter().sum::<f32>() / rows.max(1) as f32)
+    row_us
 }
 
 /// The time in µs, and the count of the processor's cycles.

@@ -40,12 +40,12 @@ impl<'b> Own<'b> {
             reciprocals: self.reciprocals.as_ref().map(|all| &all[..]),
             start_us,
             row_us: &row_us,
-            ahead_us: f32::midpoint(row_us[0], row_us[1]) + 1500.0,
         };
         let (mut outputs, mut status) = ([0.0; ROWS * OUTPUTS], [RowStatus::Decoded; ROWS]);
         let mut estimate = Estimate { outputs: &mut outputs, status: &mut status };
-        if tracker.follow(state, &read, &mut estimate) {
+        if tracker.follow(state, &read) {
             self.followed += 1;
+            tracker.write(state, 1500.0, &mut estimate);
             return bits(outputs);
         }
         let (mut filled, mut scratch) = (*frame, vec![0.0; decoder.scratch_floats()]);
@@ -54,7 +54,11 @@ impl<'b> Own<'b> {
         let frame =
             taxel_core::Frame { readings_ohm: filled.as_flattened(), reciprocals: &reciprocals };
         decoder.decode_into(frame, &mut scratch, &mut estimate).unwrap();
-        self.decoded += u32::from(!tracker.start(state, &read, &mut estimate));
+        if tracker.start(state, &read, &estimate) {
+            tracker.write(state, 1500.0, &mut estimate);
+        } else {
+            self.decoded += 1;
+        }
         bits(outputs)
     }
 }

@@ -136,16 +136,16 @@ impl Board<'_> {
         for (number, start_s) in self.table.starts_s.iter().enumerate() {
             let readings_ohm = &self.readings(course, *start_s, random)[..];
             let mut estimate = self.decoder.decode(readings_ohm).expect("a frame of this model");
-            let (start_us, ahead_us) = ((1e6 * start_s) as u64, 1e6 * self.frame_s as f32);
-            let frame =
-                Frame { readings_ohm, reciprocals: None, start_us, row_us: &row_us, ahead_us };
-            let is_followed = self.tracker.follow(&mut state, &frame, &mut estimate.borrowed());
+            let start_us = (1e6 * start_s) as u64;
+            let frame = Frame { readings_ohm, reciprocals: None, start_us, row_us: &row_us };
+            let is_followed = self.tracker.follow(&mut state, &frame);
             if !is_followed {
-                self.tracker.start(&mut state, &frame, &mut estimate.borrowed());
+                self.tracker.start(&mut state, &frame, &estimate.borrowed());
             }
             let change = baseline.largest_relative_deviation(readings_ohm).unwrap_or(0.0);
             let is_touched = touch.update(change, (TOUCH_DEVIATIONS * self.noise) as f32);
-            let load = estimate.outputs.iter().copied().fold(0.0, f32::max);
+            let deepest = || estimate.outputs.iter().copied().fold(0.0, f32::max);
+            let load = if is_followed { state.depth_mm() } else { deepest() };
             let place_mm = state.place_mm().filter(|_| is_followed);
             let shown = Shown { start_us, is_touched, load, place_mm };
             events.update(self.settings, shown);

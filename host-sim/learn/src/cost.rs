@@ -76,9 +76,9 @@ const RELATIVE: f64 = 12.0;
 const FILTER: [f64; 3] = [163.0, 24.0, 26.0];
 const FILTER_CYCLES: f64 = 1.7;
 
-/// Instructions of a tracker whose contact presses all electrodes: of a frame, of each electrode, of each reading, of each group
-/// of columns, and of each electrode and group; and cycles of one.
-const TRACKER: [f64; 5] = [27_500.0, 330.0, 25.0, 300.0, 53.0];
+/// Instructions of a tracker that follows a contact which presses all electrodes: of a frame, of each electrode, of each
+/// reading, of each group of columns, and of each electrode and group; and cycles of one.
+const TRACKER: [f64; 5] = [27_500.0, 146.0, 25.0, 300.0, 53.0];
 const TRACKER_CYCLES: f64 = 1.85;
 
 /// Instructions of what stands before a `network`, for so many `readings` of a frame.

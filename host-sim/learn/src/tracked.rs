@@ -53,9 +53,9 @@ impl<'b, D: FrameDecoder> Tracked<'b, D> {
                 reciprocals,
                 start_us: *start_us,
                 row_us: &row_us,
-                ahead_us: self.ahead_us,
             };
-            self.tracker.track(state, &frame, &mut estimate);
+            let ahead_us = self.ahead_us - frame.middle().0;
+            self.tracker.track(state, &frame, ahead_us, &mut estimate);
             values.iter_mut().zip(outputs).for_each(|(value, output)| *value = f64::from(output));
         }
     }

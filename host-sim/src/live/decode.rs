@@ -96,9 +96,8 @@ impl<'b> FrameByFrame<'b> {
                 reciprocals: Some(&self.reciprocals[..]).filter(|all| !all.is_empty()),
                 start_us: moment.frame.time_us,
                 row_us: &vec![0.0; shape.rows],
-                ahead_us: 0.0,
             };
-            is_tracked = tracker.track(state, &frame, &mut estimate);
+            is_tracked = tracker.track(state, &frame, 0.0, &mut estimate);
         }
         let mut deviations = vec![f32::NAN; outputs.len()];
         let novelty =

@@ -70,7 +70,7 @@ impl Sizes {
     }
 }
 
-/// A frame of readings, when rows were read, and how far ahead its estimate is to be.
+/// A frame of readings, and when its rows were read.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Frame<'f> {
     /// All cells in Ω, row after row; one that is NaN does not count.
@@ -81,13 +81,11 @@ pub struct Frame<'f> {
     pub start_us: u64,
     /// Time in µs from there to the middle of each row's readings.
     pub row_us: &'f [f32],
-    /// Time in µs from the start for which outputs are expected.
-    pub ahead_us: f32,
 }
 
 impl Frame<'_> {
     /// Middle of the times of rows, in µs from the start and by the clock: the time that a state is of.
-    pub(super) fn middle(&self) -> (f32, u64) {
+    pub fn middle(&self) -> (f32, u64) {
         let middle_us = self.row_us.iter().sum::<f32>() / self.row_us.len().max(1) as f32;
         (middle_us, self.start_us.saturating_add(middle_us as u64))
     }

@@ -107,14 +107,9 @@ fn track(frames: u32, change: impl Fn(u32, &mut [f32])) -> (f32, u32) {
         let mut status = [RowStatus::Decoded; 4];
         let mut estimate = Estimate { outputs: &mut outputs, status: &mut status };
         let start_us = 2000 * u64::from(frame);
-        let frame_read = Frame {
-            readings_ohm: &ohm,
-            reciprocals: None,
-            start_us,
-            row_us: &row_us,
-            ahead_us: 3000.0,
-        };
-        let is_explained = tracker.track(&mut state, &frame_read, &mut estimate);
+        let frame_read = Frame { readings_ohm: &ohm, reciprocals: None, start_us, row_us: &row_us };
+        let ahead_us = 3000.0 - frame_read.middle().0;
+        let is_explained = tracker.track(&mut state, &frame_read, ahead_us, &mut estimate);
         explained += u32::from(is_explained);
         if frame >= frames / 2 && is_explained {
             let errors = tracker.places_mm.iter().zip(&outputs);
@@ -162,8 +157,8 @@ fn gaps_and_times_that_go_back_start_anew() {
         let (mut outputs, mut status) = ([0.1; 16], [RowStatus::Decoded; 4]);
         let mut estimate = Estimate { outputs: &mut outputs, status: &mut status };
         let (row_us, reciprocals) = (&[0.0; 4], None);
-        let frame = Frame { readings_ohm: &ohm, reciprocals, start_us, row_us, ahead_us: 0.0 };
-        tracker.track(state, &frame, &mut estimate);
+        let frame = Frame { readings_ohm: &ohm, reciprocals, start_us, row_us };
+        tracker.track(state, &frame, 0.0, &mut estimate);
         (state.is_known, state.now.mean)
     };
     let first = at(&mut State::new(), 0);
@@ -197,13 +192,7 @@ fn slopes_are_those_of_depths_and_readings() {
     // A state that is off is told the way: the gradient is that of the squares.
     let ohm = readings(&tracker, |_| latents);
     let row_us = [0.0; 4];
-    let frame = Frame {
-        readings_ohm: &ohm,
-        reciprocals: None,
-        start_us: 0,
-        row_us: &row_us,
-        ahead_us: 0.0,
-    };
+    let frame = Frame { readings_ohm: &ohm, reciprocals: None, start_us: 0, row_us: &row_us };
     let mut mean = [0.0; NUMBERS];
     mean.iter_mut().zip(latents).for_each(|(number, latent)| *number = latent + 0.01);
     let (mut information, mut gradient) = ([[0.0; LATENTS]; LATENTS], [0.0; LATENTS]);
@@ -273,9 +262,8 @@ fn floats_that_no_tracker_has_are_refused_and_no_number_makes_it_panic() {
                     reciprocals: Some(&ohm),
                     start_us: 1000 * frame,
                     row_us: &[number; 3],
-                    ahead_us: number,
                 };
-                tracker.track(&mut state, &frame, &mut estimate);
+                tracker.track(&mut state, &frame, number, &mut estimate);
             }
         }
     }

@@ -92,25 +92,27 @@ impl Settings {
     ) {
         let Contact { mean, root, .. } = contact;
         *mean = self.mean_after(mean, dt_s);
-        *covariance = [[0.0; NUMBERS]; NUMBERS];
-        for (axis, [rate, deviation, _]) in self.smooth.into_iter().enumerate() {
+        for (axis, [rate, ..]) in self.smooth.into_iter().enumerate() {
             let (value, speed) = (axis, LATENTS + axis);
             let [[a, b], [c, d]] = transition(rate, dt_s);
             let (values, speeds) = (root[value], root[speed]);
             root[value] = core::array::from_fn(|at| a * values[at] + b * speeds[at]);
             root[speed] = core::array::from_fn(|at| c * values[at] + d * speeds[at]);
-            let [of_value, of_both, of_speed] = spread(rate, deviation, dt_s);
-            covariance[value][value] = of_value;
-            covariance[speed][value] = of_both;
-            covariance[speed][speed] = of_speed;
-        }
-        for (place, walk) in (RATES..LATENTS).zip(self.walks) {
-            covariance[place][place] = walk * dt_s;
         }
         for row in 0..NUMBERS {
             for column in 0..=row {
-                covariance[row][column] += dot(&root[row], &root[column]);
+                covariance[row][column] = dot(&root[row], &root[column]);
             }
+        }
+        for (axis, [rate, deviation, _]) in self.smooth.into_iter().enumerate() {
+            let (value, speed) = (axis, LATENTS + axis);
+            let [of_value, of_both, of_speed] = spread(rate, deviation, dt_s);
+            covariance[value][value] += of_value;
+            covariance[speed][value] += of_both;
+            covariance[speed][speed] += of_speed;
+        }
+        for (place, walk) in (RATES..LATENTS).zip(self.walks) {
+            covariance[place][place] += walk * dt_s;
         }
         cholesky(covariance);
         *root = *covariance;

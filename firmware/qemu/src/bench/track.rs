@@ -1,5 +1,6 @@
-//! Tracks a contact, for `cargo xtask cycles`, which counts instructions as it does of the program beside this one. The
-//! model in slot A has a tracker; slot B holds a frame of its readings in Ω.
+//! What a board does with a frame behind its sums while it tracks a contact, for `cargo xtask cycles`, which counts
+//! instructions as it does of the program beside this one. The model in slot A has a tracker; slot B holds a frame of its
+//! readings in Ω.
 #![no_std]
 #![no_main]
 
@@ -12,9 +13,16 @@ use cortex_m_rt::entry;
 use defmt::{assert, unwrap};
 use qemu_image::exit;
 use qemu_image::slot::Slot;
-use taxel_core::blob::Model;
+use taxel_core::blob::{Floats, Model};
 use taxel_core::track::{Frame, State};
-use taxel_core::{Estimate, RowStatus};
+use taxel_core::{ColumnWires, Estimate, RowStatus, RowWire};
+use taxel_firmware::circuit::ZeroPotential;
+use taxel_firmware::link::message::{EstimateReport, Report};
+use taxel_firmware::link::{cobs, packet};
+use taxel_firmware::readout::{
+    FrameSource, PassScanner, RowTimes, ScanSettings, Scanning, Selection, Sequencer,
+    SequencerFault,
+};
 
 use region::{calibrate, region};
 
@@ -41,23 +49,96 @@ fn main() -> ! {
     for (reading, bytes) in readings_ohm.iter_mut().zip(frame.bytes().as_chunks().0) {
         *reading = f32::from_le_bytes(*bytes);
     }
+    convert_sums();
     let mut status = [RowStatus::MissingReading; MOST_ROWS];
     let mut estimate = Estimate { outputs, status: unwrap!(status.get_mut(..shape.rows)) };
     let state = unwrap!(cortex_m::singleton!(: State = State::new()));
     let row_us = [0.0; MOST_ROWS];
     let row_us = unwrap!(row_us.get(..shape.rows));
-    let at =
-        |start_us| Frame { readings_ohm, reciprocals: None, start_us, row_us, ahead_us: 1000.0 };
+    let at = |start_us| Frame { readings_ohm, reciprocals: None, start_us, row_us };
     for frame in 0..SETTLED {
         let frame = at(1000 * frame);
-        if !tracker.follow(state, &frame, &mut estimate) {
-            tracker.start(state, &frame, &mut estimate);
+        if !tracker.follow(state, &frame) {
+            tracker.start(state, &frame, &estimate);
         }
     }
     let (frame, mut explained) = (at(1000 * SETTLED), false);
-    region("track", || {
-        explained = black_box(&tracker).follow(black_box(state), black_box(&frame), &mut estimate);
+    region("follow", || {
+        explained = black_box(&tracker).follow(black_box(state), black_box(&frame));
+    });
+    region("write", || {
+        black_box(&tracker).write(black_box(state), black_box(1000.0), &mut estimate);
     });
     assert!(explained, "the frame is not explained");
+    report(&estimate);
     exit::success()
+}
+
+/// Makes a report of the `estimate`, and puts it into a ring as the NUCLEO-F446RE does.
+fn report(estimate: &Estimate<'_>) {
+    let buffer = unwrap!(cortex_m::singleton!(: [u8; 2048] = [0; 2048]));
+    let ring = unwrap!(cortex_m::singleton!(: [u8; 2048] = [0; 2048]));
+    let row_status = [0; MOST_ROWS];
+    let mut queued = 0;
+    region("report", || {
+        let report = Report::Estimate(EstimateReport {
+            frame: 1,
+            start_us: 1,
+            flags: 0,
+            row_status: unwrap!(row_status.get(..estimate.status.len())),
+            outputs: Floats::new(black_box(estimate.outputs)),
+            novelty: None,
+            deviation: Floats::new(&[]),
+        });
+        let bytes = unwrap!(packet::encode(packet::UNASKED, &report, buffer));
+        cobs::encode(bytes, |piece| {
+            for byte in piece {
+                if let Some(place) = ring.get_mut(queued) {
+                    *place = *byte;
+                }
+                queued = (queued + 1) % 2048;
+            }
+            true
+        });
+    });
+    assert!(queued > 4 * estimate.outputs.len(), "the report is too short");
+}
+
+/// Sums of samples as of the paper's sensor at rest.
+struct Sums;
+
+impl Sequencer<18> for Sums {
+    const FULL_SCALE_COUNTS: u16 = 4095;
+    const MOST_SAMPLES: u16 = 16;
+
+    fn start(&mut self, _: &[Option<RowWire>], _: u32, _: u16) {}
+
+    fn poll(&mut self, sums: &mut [[u32; 18]]) -> Option<Result<(), SequencerFault>> {
+        let (idle, rows) = sums.split_first_mut()?;
+        idle.fill(12 * 250);
+        rows.as_flattened_mut().fill(12 * 2000);
+        Some(Ok(()))
+    }
+
+    fn stop(&mut self) {}
+
+    fn line_times(&self, _: usize, _: ScanSettings) -> RowTimes {
+        RowTimes::default()
+    }
+}
+
+/// Turns the sums of a scan of 8 × 18 wires into Ω.
+fn convert_sums() {
+    let sums = unwrap!(cortex_m::singleton!(: [[u32; 18]; 9] = [[0; 18]; 9]));
+    let mut scanner = PassScanner::<_, 8, 9, 18>::new(Sums, ZeroPotential::TYPICAL, sums);
+    let Scanning::Runs(scanner) = scanner.scanning() else { return };
+    let rows = [0, 1, 2, 3, 4, 5, 6, 7].map(RowWire);
+    let wires = Selection { rows: &rows, columns: ColumnWires::first(18) };
+    scanner.start(ScanSettings { settling_us: 1, oversampling: 12 }, wires);
+    scanner.poll();
+    let mut frame = [0.0; 144];
+    region("readings", || {
+        black_box(&mut *scanner).take(black_box(&mut frame));
+    });
+    assert!(frame.iter().all(|ohm| ohm.is_finite()), "a reading is missing");
 }
