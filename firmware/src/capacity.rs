@@ -201,7 +201,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_shape_within_the_capacity_has_room_and_without_names_the_first_wires() {
+    fn every_shape_within_the_capacity_fits() {
         let capacity = Capacity { rows: 3, columns: 4, outputs: 2 };
         // Rows, inputs, outputs, and the first input that has no wires.
         for (rows, inputs, outputs, without) in [

@@ -368,7 +368,7 @@ mod tests {
     }
 
     #[test]
-    fn the_circuit_returns_the_resistances_whatever_each_rows_source_and_each_columns_parts() {
+    fn the_circuit_returns_the_resistances_for_any_of_its_parts() {
         for source_ohm in [0.0, 0.3, 5.0] {
             let mut circuit =
                 ZeroPotential { row_source_ohm: [9.0, source_ohm], ..ZeroPotential::TYPICAL };
@@ -413,7 +413,7 @@ mod tests {
     }
 
     #[test]
-    fn columns_that_are_not_read_load_the_row_by_their_measured_share() {
+    fn unread_columns_load_the_row_by_their_measured_share() {
         let mut circuit = ZeroPotential { row_source_ohm: [9.0, 0.3], ..ZeroPotential::TYPICAL };
         (0..18).for_each(|k| circuit.feedback_ohm[k] -= k as f32);
         let (columns, scale) = (ColumnWires(1 << 2 | 1 << 8 | 1 << 14), circuit.scale(4095));

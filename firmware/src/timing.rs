@@ -304,7 +304,7 @@ mod tests {
     }
 
     #[test]
-    fn the_boards_own_converters_are_triggered_in_time_for_every_setting() {
+    fn own_converters_are_triggered_in_time_for_every_setting() {
         for clock_mhz in [158, 180] {
             for settling_us in [0, 1, 20, 363, 1_000, 10_000] {
                 for samples in 1..=ONCHIP_SAMPLES {
@@ -346,7 +346,7 @@ mod tests {
     }
 
     #[test]
-    fn no_scan_that_can_be_configured_takes_as_long_as_one_that_is_given_up() {
+    fn every_scan_that_can_be_configured_ends_before_the_time_limit() {
         let (settling_us, oversampling) =
             (ScanSettings::MOST_SETTLING_US, ScanSettings::MOST_OVERSAMPLING);
         let plan = ScanPlan::of_nucleo_onchip(ONCHIP_ROWS, ONCHIP_COLUMNS, oversampling);

@@ -57,7 +57,7 @@ fn the_hand_made_model_decodes_on_the_host_as_in_the_emulator() {
 }
 
 #[test]
-fn every_format_decodes_many_frames_on_the_host_as_in_the_emulator() {
+fn every_format_decodes_on_the_host_as_in_the_emulator() {
     expect("kernels", |say| {
         let mut judged = |line: Arguments<'_>| {
             let text = line.to_string();
@@ -72,7 +72,7 @@ fn every_format_decodes_many_frames_on_the_host_as_in_the_emulator() {
 }
 
 #[test]
-fn models_of_fixed_size_decode_as_their_blobs_on_the_host_as_in_the_emulator() {
+fn models_of_fixed_size_decode_on_the_host_as_in_the_emulator() {
     let blobs = ["hand-made.bin", "row4.bin", "array-touch.bin"].map(model);
     expect("fixed", |say| fixed::compare_all(blobs, say));
 }

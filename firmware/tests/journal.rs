@@ -32,7 +32,7 @@ fn starts(page: &[u8]) -> Vec<usize> {
 }
 
 #[test]
-fn no_flipped_bit_of_a_start_item_loses_anything_and_a_start_makes_it_good() {
+fn no_flipped_bit_of_a_start_item_loses_anything() {
     let mut journal = with_constants();
     let pages = bytes_of(&mut journal);
     let starts = starts(&pages[1]);
@@ -111,7 +111,7 @@ fn what_does_not_fit_is_refused_and_nothing_is_lost() {
 }
 
 #[test]
-fn the_settings_of_a_sensor_of_16_rows_and_32_columns_fit_however_often_they_change() {
+fn settings_of_16_rows_and_32_columns_fit_after_many_changes() {
     let mut journal = with_constants();
     let lengths = [40, 11 + 4 * (16 + 2 * 32), 9 + 4 * 16 * 32];
     for seed in 0..30_u8 {

@@ -87,7 +87,7 @@ fn every_setting_survives_a_restart_and_can_be_forgotten() {
 }
 
 #[test]
-fn a_configuration_of_another_version_is_not_believed_and_constants_are() {
+fn stored_constants_outlast_a_version_and_configurations_do_not() {
     let mut device = Device::new(Flash::slots_with(&blob(1, 3)));
     device.session(|host| {
         for setting in [Setting::Configuration, Setting::Constants] {

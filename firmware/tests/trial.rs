@@ -123,7 +123,7 @@ fn a_trial_that_is_not_confirmed_in_time_ends_and_says_so() {
 }
 
 #[test]
-fn undos_go_to_and_fro_between_two_models_and_are_limited_between_restarts() {
+fn undo_alternates_between_two_models_a_limited_number_of_times() {
     let mut bench = installed();
     assert_eq!(bench.session().undo(7).0, Err(Refusal::NothingToUndo));
     for undos in 0..100 {
@@ -140,7 +140,7 @@ fn undos_go_to_and_fro_between_two_models_and_are_limited_between_restarts() {
 }
 
 #[test]
-fn once_an_upload_has_begun_there_is_no_way_back_even_if_it_sends_the_same_bytes() {
+fn an_upload_that_has_begun_ends_undo_even_with_the_same_bytes() {
     let mut bench = installed();
     let old = old();
     bench.install(&old).unwrap();

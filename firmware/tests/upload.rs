@@ -5,7 +5,7 @@ use taxel_firmware::link::message::{ModelFault, Refusal, UploadState, UploadStep
 use taxel_firmware::store::ERASES_AT_ONCE;
 
 #[test]
-fn a_good_model_comes_into_force_and_stays_and_a_repeated_confirmation_does_no_harm() {
+fn a_good_model_becomes_active_and_may_be_confirmed_again() {
     let mut device = Device::new(Flash::slots_with(&blob(1, 3)));
     for generation in 1..=5_u32 {
         let next = blob(1 + generation as usize, 2 + generation as usize);
@@ -20,7 +20,7 @@ fn a_good_model_comes_into_force_and_stays_and_a_repeated_confirmation_does_no_h
 }
 
 #[test]
-fn the_watchdog_is_fed_just_before_and_after_a_slot_is_erased_even_if_the_sensor_is_silent() {
+fn the_watchdog_is_fed_before_and_after_a_slot_is_erased() {
     let mut host = started(every(1000), &[]);
     *host.frame() = [[f32::NAN; COLS]; ROWS];
     host.turn(2000);
@@ -35,7 +35,7 @@ fn the_watchdog_is_fed_just_before_and_after_a_slot_is_erased_even_if_the_sensor
 }
 
 #[test]
-fn a_model_flashed_with_the_firmware_is_in_force_until_the_first_upload_begins_in_its_slot() {
+fn a_flashed_model_is_active_until_an_upload_erases_its_slot() {
     let (flashed, first) = (blob(1, 3), blob(2, 4));
     let mut device = Device::new(Flash::slots_with(&flashed));
     device.install(&first).unwrap();
@@ -50,7 +50,7 @@ fn a_model_flashed_with_the_firmware_is_in_force_until_the_first_upload_begins_i
 }
 
 #[test]
-fn what_cannot_come_into_force_costs_no_erase_and_a_repeated_begin_costs_none_more() {
+fn a_refused_upload_erases_nothing_nor_does_a_repeated_begin() {
     let mut host = started(quiet(), &blob(1, 3));
     let good = blob(2, 4);
     let slot_bytes = Flash::SLOT_BYTES as u32;

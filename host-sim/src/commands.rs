@@ -107,7 +107,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn an_error_names_the_option_that_mends_it_whichever_crate_found_it() {
+    fn an_error_names_the_option_to_change_whichever_crate_found_it() {
         let errors = || {
             [
                 taxel_data::BadValue::new("memory", 1, "give more").into(),

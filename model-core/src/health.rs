@@ -123,7 +123,7 @@ mod tests {
     const LIMITS: Limits = Limits { shorted_below_ohm: 5.0, open_above_ohm: 500.0 };
 
     #[test]
-    fn every_fault_is_told_by_wire_and_kind_and_the_rest_is_untouched() {
+    fn every_fault_is_named_by_wire_and_kind_and_the_rest_is_kept() {
         let mut frame = [[60.0_f32; 32]; 3];
         frame[0][31] = f32::NAN;
         frame[2][0] = 4.9;

@@ -46,7 +46,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_product_with_the_reciprocal_is_the_quotient_within_two_roundings() {
+    fn a_product_with_the_reciprocal_is_within_two_roundings() {
         let mut differs = 0;
         for step in 0..20_000_u16 {
             let (reading, baseline) =

@@ -83,7 +83,7 @@ fn relative_inputs_are_a_section_of_one_byte_before_all_others() {
 }
 
 #[test]
-fn errors_of_the_linear_decoder_are_a_section_before_the_networks() {
+fn the_linear_decoders_errors_are_a_section_before_the_networks() {
     let (mut plain, mut buffer) = (Aligned([0; 512]), Aligned([0; 512]));
     let networks = [network()];
     let rmse = [0, 0, 0, 0x3e, 0, 0, 0x40, 0x3e]; // 0.125, 0.1875
@@ -186,7 +186,7 @@ fn every_truncation_and_any_trailing_byte_is_refused() {
 }
 
 #[test]
-fn sections_out_of_order_and_bad_metadata_are_refused_under_a_valid_crc() {
+fn misordered_sections_and_bad_metadata_are_refused() {
     let [blob, _] = blobs();
     let refused = |offset: usize, bytes: &[u8]| {
         let mut blob = blob.clone();

@@ -35,7 +35,7 @@ fn it_has_room_for_so_many_rows_and_fewer() {
 }
 
 #[test]
-fn a_slice_of_another_length_is_refused_by_name_and_nothing_is_written() {
+fn a_slice_of_wrong_length_is_named_and_nothing_is_written() {
     let blob = blob(ROWS);
     let decoder = EightRows::load(&blob).unwrap();
     let refused = |readings: usize, scratch: usize, outputs: usize, rows: usize| {

@@ -53,7 +53,7 @@ fn a_blob_keeps_its_reading_model_and_a_model_without_has_none() {
 }
 
 #[test]
-fn a_decoder_assesses_readings_or_ratios_and_has_its_lengths_checked() {
+fn a_decoder_assesses_readings_and_ratios_and_checks_lengths() {
     let [plain, relative] = [false, true].map(|relative| blob(relative, full()));
     let [plain, relative] = [&plain, &relative].map(|blob| Decoder::<2>::load(blob).unwrap());
     assert_eq!(plain.scratch_floats(), 4 + 2 + 3);

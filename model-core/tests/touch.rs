@@ -94,7 +94,7 @@ fn without_a_touch_places_alone_are_missing() {
 }
 
 #[test]
-fn a_missing_reading_or_baseline_leaves_no_output_of_any_network() {
+fn a_missing_reading_or_baseline_leaves_every_output_missing() {
     for missing in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
         let mut frame = TOUCHED;
         frame[1] = missing;
@@ -117,7 +117,7 @@ fn an_amount_that_overflows_by_the_strength_is_nan_alone() {
 }
 
 #[test]
-fn an_output_in_fixed16_that_could_overflow_is_refused_when_loaded() {
+fn an_output_in_fixed16_that_could_overflow_is_refused_at_load() {
     let shape = Shape { inputs: 5, centres: 1, outputs: 1 };
     let with_scale = |scale: f32| {
         let mut centres = [0; 16 * 4 + 8];
@@ -143,7 +143,7 @@ fn an_output_in_fixed16_that_could_overflow_is_refused_when_loaded() {
 }
 
 #[test]
-fn a_front_has_the_specifications_worked_bytes_and_is_given_back() {
+fn a_front_has_the_bytes_of_the_specification_and_is_read_back() {
     let blob = three(-1.0, false);
     let bytes = worked_bytes("worked front");
     let start = blob.windows(4).position(|it| it == [4, 1, 1, 2]).unwrap();

@@ -184,7 +184,7 @@ def test_fewer_lines_than_centres_take_fewer_with_a_warning():
         ({"features_kind": "shape"}, "normalised"),
     ],
 )
-def test_bad_parameters_are_value_errors_with_the_message_of_the_command(parameters, message):
+def test_bad_parameters_are_value_errors_with_the_same_message(parameters, message):
     x, y = smooth()
     with pytest.raises(ValueError, match=message):
         taxel.Model(**({"refine": False} | parameters)).fit(x, y)
@@ -213,7 +213,7 @@ def test_the_ten_lines_of_the_page_do_what_they_say(tmp_path, monkeypatch, capsy
     assert "int finger_decode(" in (tmp_path / "model-c/src/finger.h").read_text()
 
 
-def test_a_mat_is_told_by_names_or_by_its_grid_and_never_by_numbers_that_nobody_gave():
+def test_a_mat_is_recognised_by_names_or_grid_and_not_by_numbers():
     x, y = smooth(200, 64)
     names = [f"adc_{cell}" for cell in range(64)]
     fit = lambda x, **grid: taxel.Model(4, refine=False, **grid).fit(x, y).blob_.input_names[:1]
@@ -307,7 +307,7 @@ def test_few_noisy_lines_are_told_no_worse_than_by_ridge():
             assert found > known - 0.02, (data, model)
 
 
-def test_few_lines_are_told_with_a_spread_of_their_own_and_refined():
+def test_few_lines_have_their_own_spread_and_are_refined():
     from sklearn.datasets import make_friedman1
 
     x, y = make_friedman1(1750, noise=1.0, random_state=0)
@@ -317,7 +317,7 @@ def test_few_lines_are_told_with_a_spread_of_their_own_and_refined():
         assert len(model.report_["selection"]["scored"]) > 100
 
 
-def test_outputs_may_be_missing_constant_or_called_like_a_feature():
+def test_outputs_may_be_missing_constant_or_named_like_a_feature():
     x, y = smooth()
     model = taxel.Model(8, refine=False, penalty=1e-6)
     whole = model.fit(x, y).score(x, y)

@@ -55,7 +55,7 @@ def test_errors_of_a_model_are_those_of_the_command():
     assert np.isclose(rmse, np.sqrt((left**2).mean()), rtol=1e-5)
 
 
-def test_the_interpreter_goes_on_meanwhile_and_ctrl_c_ends_the_work():
+def test_python_runs_during_training_and_ctrl_c_ends_it():
     import _thread
 
     ticks = []

@@ -183,7 +183,7 @@ mod tests {
 
     #[cfg(unix)]
     #[test]
-    fn steps_of_a_row_follow_one_another_even_after_a_failure_and_rows_run_together() {
+    fn steps_of_a_row_run_in_order_and_rows_in_parallel() {
         let logs = env::temp_dir().join(format!("taxel-rows-{}", std::process::id()));
         fs::create_dir_all(&logs).unwrap();
         let step = |name, script: &str| {

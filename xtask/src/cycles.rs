@@ -197,7 +197,7 @@ mod tests {
     }
 
     #[test]
-    fn figures_are_compared_exactly_with_their_compilers_and_by_their_excess_with_others() {
+    fn figures_must_be_equal_only_for_the_same_compiler() {
         let figure = |scope: &str, instructions, predicted| Figure {
             model: "f32 K = 16".into(),
             scope: scope.into(),

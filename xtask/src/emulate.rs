@@ -168,7 +168,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_program_has_its_expected_output_and_no_output_lacks_its_program() {
+    fn programs_and_expected_outputs_come_in_pairs() {
         let directory = root().join("firmware/qemu/src/bin");
         let programs = programs(&directory).unwrap();
         assert!(!programs.is_empty());

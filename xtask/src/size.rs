@@ -149,7 +149,7 @@ mod tests {
     };
 
     #[test]
-    fn variables_with_a_value_take_flash_and_ram_and_weights_of_fixed_size_count_for_nothing() {
+    fn variables_with_a_value_take_flash_and_ram() {
         assert_eq!((SIZE.flash(), SIZE.ram()), (4221, 654_000));
     }
 

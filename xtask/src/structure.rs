@@ -1,5 +1,5 @@
-//! Check of the workspace's structure: which crate may depend on which, and that it uses what it depends on. Here a new
-//! crate is declared.
+//! Check of the workspace's structure: which crate may depend on which, that it uses what it depends on, and that names are
+//! short. Here a new crate is declared.
 
 use std::fs;
 use std::path::Path;
@@ -31,11 +31,21 @@ const PROOF: &[&str] = &["taxel-fuzz", "benchmarks"];
 /// Number of crates of the product, which depends on none that proves it.
 const PRODUCT: usize = DEVICE.len() + DESK.len();
 
-/// Fails if a crate depends on one above it, or on one that it does not use, or is not declared.
+/// Most letters of the name of a function or a test.
+const LONGEST_NAME: usize = 60;
+
+/// Fails if a crate depends on one above it, or on one that it does not use, or is not declared; or if a name is too long.
 pub fn run() -> Outcome {
     let metadata = metadata()?;
     let mut broken = broken(&metadata);
-    broken.extend(metadata["packages"].as_array().into_iter().flatten().flat_map(unused));
+    for package in metadata["packages"].as_array().into_iter().flatten() {
+        let manifest = Path::new(package["manifest_path"].as_str().unwrap_or_default());
+        let code = sources(manifest.parent().unwrap_or(manifest));
+        broken.extend(unused(package, &code));
+        broken.extend(long_names(&code).map(|name| {
+            format!("{name} has {} letters: give it at most {LONGEST_NAME}", name.len())
+        }));
+    }
     if broken.is_empty() { Ok(()) } else { Err(broken.join("\n")) }
 }
 
@@ -47,17 +57,15 @@ pub fn metadata() -> Outcome<Value> {
     serde_json::from_str(&said.out).map_err(|cause| cause.to_string())
 }
 
-/// Dependencies of a package that none of its sources uses. (cargo-machete tells as much, and takes longer to install than
+/// Dependencies of a package that its `code` does not use. (cargo-machete does the same, and takes longer to install than
 /// everything here to build.)
-fn unused(package: &Value) -> Vec<String> {
-    let manifest = Path::new(package["manifest_path"].as_str().unwrap_or_default());
-    let text = sources(manifest.parent().unwrap_or(manifest));
+fn unused(package: &Value, code: &str) -> Vec<String> {
     let ignored = package["metadata"]["cargo-machete"]["ignored"].as_array();
     let dependencies = package["dependencies"].as_array().into_iter().flatten();
     let named = dependencies.filter_map(|it| it["rename"].as_str().or(it["name"].as_str()));
     named
         .filter(|name| ignored.is_none_or(|ignored| !ignored.iter().any(|it| it == name)))
-        .filter(|name| !uses(&text, &name.replace('-', "_")))
+        .filter(|name| !uses(code, &name.replace('-', "_")))
         .map(|name| format!("{} does not use {name:?}", package["name"]))
         .collect()
 }
@@ -77,13 +85,21 @@ fn uses(code: &str, name: &str) -> bool {
     })
 }
 
-/// All Rust code of the crate in a `folder`, without comments and without that of crates within.
+/// Names of functions, in Rust and in Python, that are too long.
+fn long_names(code: &str) -> impl Iterator<Item = &str> {
+    let functions = ["fn ", "def "].into_iter().flat_map(|word| code.split(word).skip(1));
+    let names =
+        functions.filter_map(|it| it.split(|it: char| !it.is_alphanumeric() && it != '_').next());
+    names.filter(|name| name.len() > LONGEST_NAME)
+}
+
+/// All code of the crate in a `folder`, without comments and without that of crates within.
 fn sources(folder: &Path) -> String {
     let mut text = String::new();
     for path in fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path()) {
         if path.is_dir() && !path.join("Cargo.toml").exists() && !path.ends_with("target") {
             text += &sources(&path);
-        } else if path.extension().is_some_and(|end| end == "rs") {
+        } else if path.extension().is_some_and(|end| end == "rs" || end == "py") {
             let code = fs::read_to_string(path).unwrap_or_default();
             text.extend(
                 code.lines().filter_map(|line| line.split("//").next()).flat_map(|it| [it, "\n"]),
@@ -130,16 +146,13 @@ mod tests {
     use serde_json::json;
 
     #[test]
-    fn a_dependency_that_only_a_module_or_a_comment_is_named_after_is_not_used() {
+    fn a_dependency_named_only_by_a_module_or_a_comment_is_unused() {
         let folder = std::env::temp_dir().join(format!("taxel-structure-{}", std::process::id()));
         fs::create_dir_all(&folder).unwrap();
         let unused = |code: &str| {
             fs::write(folder.join("lib.rs"), code).unwrap();
-            let package = json!({
-                "name": "a", "manifest_path": folder.join("Cargo.toml"),
-                "dependencies": [{"name": "blue-sky"}],
-            });
-            unused(&package)
+            let package = json!({"name": "a", "dependencies": [{"name": "blue-sky"}]});
+            unused(&package, &sources(&folder))
         };
         for code in [
             "use blue_sky::Cloud;",
@@ -160,6 +173,13 @@ mod tests {
             assert_eq!(unused(code), ["\"a\" does not use \"blue-sky\""], "{code}");
         }
         fs::remove_dir_all(folder).unwrap();
+    }
+
+    #[test]
+    fn names_longer_than_60_letters_are_found() {
+        let [good, long] = [60, 61].map(|length| "a".repeat(length));
+        let code = format!("fn {good}() {{}}\nfn {long}<T>() {{}}\ndef {long}(x):");
+        assert_eq!(long_names(&code).collect::<Vec<_>>(), [&long; 2]);
     }
 
     #[test]

@@ -88,7 +88,7 @@ mod tests {
     }
 
     #[test]
-    fn another_version_and_bytes_left_over_are_told_apart_from_damage() {
+    fn another_version_and_trailing_bytes_differ_from_damage() {
         let whole = |covered: &[u8]| [covered, &CRC_32.checksum(covered).to_le_bytes()].concat();
         for version in [PROTOCOL_VERSION - 1, PROTOCOL_VERSION + 1] {
             let other = Err(PacketError::OtherVersion { number: 9, version });

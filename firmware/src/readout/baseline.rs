@@ -128,8 +128,7 @@ mod tests {
     }
 
     #[test]
-    fn a_kept_reading_that_means_nothing_is_missing_and_a_counter_at_its_end_changes_nothing_more()
-    {
+    fn a_bad_stored_reading_is_missing_and_a_full_counter_stops() {
         let mut baseline = Baseline::new(Box::leak(Box::new([0.0; 4])));
         baseline.restore(Floats::new(&[60.0, 0.0, -1.0]), u16::MAX);
         baseline.add(&[1.0; 3]);

@@ -285,7 +285,7 @@ fn readings_are_those_of_the_mean_counts() {
 }
 
 #[test]
-fn a_failed_transaction_costs_one_reading_and_an_idle_one_its_column_until_the_next_scan() {
+fn a_failed_sample_loses_one_reading_or_one_column() {
     // The third sample of the second row's second column, and an idle one of the second column.
     for (failing, first_row) in [(2 * 3 * 4 + 4 + 2, [false; 3]), (4, [false, true, false])] {
         let (record, mut scanner) = scanner();
@@ -302,7 +302,7 @@ fn a_failed_transaction_costs_one_reading_and_an_idle_one_its_column_until_the_n
 }
 
 #[test]
-fn idle_columns_are_sampled_once_a_round_and_after_whatever_changes_them() {
+fn idle_columns_are_sampled_once_a_round_and_after_each_change() {
     let (record, mut scanner) = scanner();
     let mut frame = [f32::NAN; 6];
     let mut samples = |scanner: &mut TestScanner, settings, wires: Selection<'_>| {
@@ -352,7 +352,7 @@ fn idle_columns_are_sampled_once_a_round_and_after_whatever_changes_them() {
 }
 
 #[test]
-fn whatever_pin_change_fails_all_rows_are_released_and_its_readings_are_missing() {
+fn a_failed_pin_change_releases_all_rows_and_loses_readings() {
     for failing in 0..10 {
         let (record, mut scanner) = scanner();
         record.fail_pin_change(failing);
@@ -372,7 +372,7 @@ fn whatever_pin_change_fails_all_rows_are_released_and_its_readings_are_missing(
 }
 
 #[test]
-fn a_scan_drives_only_the_rows_that_it_is_asked_for_and_reads_each_column_at_its_own_input() {
+fn a_scan_drives_and_reads_only_the_selected_wires() {
     let (record, mut scanner) = scanner();
     let once = ScanSettings { oversampling: 1, ..SETTINGS };
     let wires = Selection { rows: &[RowWire(1)], columns: ColumnWires(0b110) };

@@ -35,7 +35,7 @@ fn readings(host: &Host<'_, '_>) -> Vec<(u32, u64, f32)> {
 }
 
 #[test]
-fn the_next_frame_is_scanned_while_one_is_decoded_and_none_is_missed() {
+fn the_next_frame_is_scanned_during_decoding_and_none_is_missed() {
     for alone in [true, false] {
         let mut host = started_alone(1000, 790);
         host.pins_mut().scans_alone = alone;
@@ -99,7 +99,7 @@ fn a_scan_under_way_is_given_up_when_what_it_is_of_changes() {
 }
 
 #[test]
-fn a_scan_of_other_wires_is_given_up_when_a_model_comes_into_force() {
+fn a_scan_of_other_wires_is_stopped_when_a_model_becomes_active() {
     let mut bench = Bench::new(every(1000), &[]);
     let mut host = bench.session();
     host.pins_mut().scans_alone = true;
@@ -114,7 +114,7 @@ fn a_scan_of_other_wires_is_given_up_when_a_model_comes_into_force() {
 }
 
 #[test]
-fn a_scan_that_never_ends_is_a_silent_sensor_which_tells_what_it_finds() {
+fn a_scan_that_never_ends_is_a_silent_sensor_and_is_diagnosed() {
     let mut host = started_alone(1000, 1_000_000_000);
     run_until_started(&mut host, 1);
     host.pins_mut().look_us = 1000;

@@ -79,7 +79,7 @@ fn a_frame_without_a_baseline_is_flagged_until_one_is_complete() {
 }
 
 #[test]
-fn a_baseline_that_will_not_come_is_refused_and_one_that_comes_is_counted_once() {
+fn an_abandoned_baseline_is_refused_and_others_count_once() {
     let mut host = started(every(100), &blob(3, 4));
     let refused = format!("{:?}", Report::Refused(Refusal::Baseline));
     // Another capture, and then a configuration without scans, end the previous capture.

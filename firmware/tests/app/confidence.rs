@@ -47,7 +47,7 @@ fn with_last(ohm: f32) -> TestFrame {
 }
 
 #[test]
-fn an_answer_has_novelty_and_deviations_as_model_core_computes_them() {
+fn an_answer_has_the_novelty_and_deviations_of_model_core() {
     for (is_relative, baseline_ohm) in [(false, f32::NAN), (true, 62.0)] {
         let blob = blob_with_readings(is_relative);
         let expected = |ohm| expected(&blob, with_last(ohm), baseline_ohm);
@@ -85,7 +85,7 @@ fn an_answer_has_novelty_and_deviations_as_model_core_computes_them() {
 }
 
 #[test]
-fn of_a_scan_comes_what_the_model_has_and_the_configuration_says() {
+fn a_scan_reports_what_the_model_has_and_the_configuration_asks() {
     let (with, without) = (blob_with_readings(false), blob(3, 4));
     let frame = with_last(900.0);
     let all = || expected(&with, frame, f32::NAN);

@@ -22,7 +22,7 @@ fn a_bad_configuration_changes_nothing() {
 }
 
 #[test]
-fn a_configuration_that_is_not_kept_lasts_until_the_host_resumes_what_is() {
+fn a_configuration_lasts_until_the_host_resumes_the_stored_one() {
     let mut host = started(every(10_000), &blob(3, 4));
     for own in [every(10_000), every(20_000)] {
         // The first is the board's own.
@@ -42,7 +42,7 @@ fn a_configuration_that_is_not_kept_lasts_until_the_host_resumes_what_is() {
 }
 
 #[test]
-fn the_same_configuration_again_keeps_time_and_the_baseline_goes_on() {
+fn an_equal_configuration_keeps_the_schedule_and_the_baseline() {
     let mut host = started(every(1000), &blob(3, 4));
     host.send(9, &Request::CaptureBaseline { frames: 1000 });
     host.run_until(50_000);

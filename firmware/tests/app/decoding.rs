@@ -38,7 +38,7 @@ fn a_reading_model_fills_one_faulty_reading_which_is_told() {
 }
 
 #[test]
-fn without_a_model_without_outputs_or_with_a_frame_of_another_length_the_answer_says_so() {
+fn an_answer_reports_a_missing_model_or_a_wrong_length() {
     let found = started(quiet(), &[]).decode(&frame_at_rest());
     assert_eq!(found, (EstimateReport::NO_MODEL, vec![1, 1], vec![]));
     let (flags, ..) = started(quiet(), &blob(OVERFLOWING, 4)).decode(&frame_at_rest());
@@ -52,7 +52,7 @@ fn without_a_model_without_outputs_or_with_a_frame_of_another_length_the_answer_
 }
 
 #[test]
-fn readings_far_beyond_the_training_range_are_flagged_and_counted() {
+fn readings_beyond_the_training_range_are_flagged_and_counted() {
     let mut host = started(quiet(), &blob(3, 4));
     // The training range is 50 to 70 Ω, and an eighth of it more on either side is not clamped.
     for (reading, clamped) in

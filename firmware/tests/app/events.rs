@@ -43,7 +43,7 @@ fn bits(events: &[(EventReport, [bool; 3])]) -> Vec<[u8; 2]> {
 }
 
 #[test]
-fn touch_and_load_are_reported_before_the_estimate_and_shown_before_that() {
+fn touch_and_load_are_shown_and_reported_before_the_estimate() {
     let (blob, rest, pressed) = (blob(3, 4), frame_at_rest(), frame_with(0, 0, 57.0));
     let frames = [rest, pressed, pressed, rest, rest];
     let found = events(Configuration::DEFAULT, &blob, &frames);

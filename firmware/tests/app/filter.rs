@@ -52,7 +52,7 @@ fn whatever_changes_what_outputs_mean_starts_the_filter_anew() {
 }
 
 #[test]
-fn one_scan_of_some_is_reported_and_all_are_filtered_whatever_is_asked_between_them() {
+fn every_scan_is_filtered_when_only_some_are_reported() {
     let blob = blob(3, 4);
     let scanning = Configuration { frame_period_us: 1000, ..filtering() };
     let mut host =

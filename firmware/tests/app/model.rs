@@ -32,7 +32,7 @@ fn the_identity_tells_what_the_model_was_trained_on() {
 }
 
 #[test]
-fn the_model_says_which_cells_are_scanned_in_which_order_and_what_is_decoded() {
+fn the_model_determines_which_cells_are_scanned_and_decoded() {
     let [first, second] = frame_at_rest();
     // Without names of wires, the first ones: a column and an output less; one network for all six readings.
     for (outputs, names, readings) in [
@@ -54,7 +54,7 @@ fn the_model_says_which_cells_are_scanned_in_which_order_and_what_is_decoded() {
 }
 
 #[test]
-fn a_model_that_does_not_fit_the_board_is_refused_and_not_put_in_force() {
+fn a_model_that_does_not_fit_the_board_is_refused() {
     let old = blob(1, 3);
     let unnamed = |inputs, outputs| {
         let shape = ModelShape { rows: 1, inputs, outputs };

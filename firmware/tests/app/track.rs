@@ -75,7 +75,7 @@ fn touch(frame: u32) -> TestFrame {
 }
 
 #[test]
-fn frames_are_tracked_as_by_model_core_without_readings_that_are_filled() {
+fn frames_are_tracked_as_in_model_core_without_filled_readings() {
     for is_relative in [false, true] {
         let (blob, rest) = (blob_with_tracker(is_relative), frame_at_rest());
         let mut host = started(leading(), &blob);

@@ -194,7 +194,7 @@ mod tests {
     }
 
     #[test]
-    fn times_are_seconds_since_the_first_line_where_their_unit_is_known() {
+    fn times_are_seconds_since_the_first_line_if_the_unit_is_known() {
         for text in [
             "time_ms,a\n500,1\n1500,2\n2500,3\n",
             "a,Timestamp\n1,2026-11-01 00:00:00.0\n2,2026-11-01 00:00:01.0\n3,2026-11-01 00:00:02.0\n",

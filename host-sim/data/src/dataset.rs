@@ -446,7 +446,7 @@ mod tests {
     }
 
     #[test]
-    fn frames_that_are_kept_are_those_of_a_subset_and_inputs_may_share_a_span() {
+    fn keeping_frames_gives_the_subset_and_inputs_may_share_a_span() {
         let names = |all: [&str; 2]| all.map(String::from).to_vec();
         let mut set = Dataset::empty(names(["a", "b"]), names(["x_mm", "f_n"]), 1, 5);
         set.inputs.values = vec![1.0, 50.0, 3.0, 20.0, 2.0, 40.0, 7.0, 30.0, 5.0, 60.0].into();

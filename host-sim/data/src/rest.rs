@@ -158,7 +158,7 @@ mod tests {
     }
 
     #[test]
-    fn forces_weights_and_deformations_are_zero_at_rest_and_places_are_not() {
+    fn forces_and_deformations_are_zero_at_rest_and_positions_not() {
         for name in ["fz_n", "force (N)", "load_g", "p_kPa", "Fz", "weight", "r4e2_dz_mm"] {
             assert!(is_zero_at_rest(name), "{name}");
         }

@@ -284,7 +284,7 @@ mod tests {
     }
 
     #[test]
-    fn places_that_are_not_told_are_the_mean_where_a_line_is_decoded() {
+    fn missing_positions_are_the_mean_where_a_line_is_decoded() {
         let of = |names: [&str; 2], estimates: [f64; 4]| {
             let names = names.map(String::from).to_vec();
             let truth = Table { names, values: vec![1.0, 2.0, 3.0, 6.0].into() };

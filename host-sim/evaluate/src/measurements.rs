@@ -328,7 +328,7 @@ mod tests {
     }
 
     #[test]
-    fn the_last_fifth_is_held_out_or_the_last_fold_where_folds_are_given() {
+    fn the_last_fifth_or_the_last_given_fold_is_held_out() {
         for (count, folds, training, test, choice) in [
             (11, None, (0..9).collect(), [9.0, 10.0], "the last fifth"),
             (5, Some(&[2, 0, 1, 2, 0][..]), vec![1, 2, 4], [0.0, 3.0], "the last fold"),

@@ -375,7 +375,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn all_groups_together_are_judged_by_their_shares_of_the_deviation() {
+    fn the_error_of_all_groups_is_the_mean_share_of_the_deviation() {
         // Deviations of 10 mm and 2 N.
         let errors = [Errors::of("x_mm", 5.0, 0.75), Errors::of("force_n", 0.4, 0.96)];
         assert!((rmse_of(&errors, ALL).unwrap() - 0.35).abs() < 1e-12);
@@ -456,7 +456,7 @@ mod tests {
     }
 
     #[test]
-    fn there_is_no_r_squared_of_values_that_only_rounding_tells_apart() {
+    fn values_that_differ_only_by_rounding_have_no_r_squared() {
         for values in [vec![0.1; 300], vec![0.1, 0.1_f64.next_up(), 0.1]] {
             let estimate: Vec<f64> = values.iter().map(|value| value + 0.01).collect();
             let truth = Table { names: vec!["b".into()], values: values.into() };

@@ -174,7 +174,7 @@ mod tests {
     }
 
     #[test]
-    fn an_estimate_without_error_when_it_is_read_has_one_when_it_is_used() {
+    fn an_estimate_that_is_exact_when_read_has_an_error_when_used() {
         let measure = Experiment::load("moving").unwrap().measure();
         let rmse = |scan_ms, period_ms, finished_ms| {
             let moving = moving(scan_ms, period_ms);

@@ -145,7 +145,7 @@ mod tests {
     }
 
     #[test]
-    fn errors_are_told_by_stretches_of_time_and_missing_values_do_not_count() {
+    fn errors_are_given_by_stretches_of_time_without_missing_values() {
         let log = log(Some("time_s"), 90);
         let values = (0..180).map(|i| f64::from(i / 2) / 9.0).collect();
         let outputs = Table { names: ["f_n", "g_n"].map(String::from).into(), values };

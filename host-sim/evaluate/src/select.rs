@@ -193,7 +193,7 @@ mod tests {
     use crate::training_options::Training;
 
     #[test]
-    fn without_an_output_that_changes_the_score_is_0_and_not_minus_0() {
+    fn a_score_without_a_changing_output_is_positive_zero() {
         assert!(score(&[0.5], &[0.0]).is_sign_positive());
     }
 
@@ -250,7 +250,7 @@ mod tests {
 
     /// Noisy outputs of few frames: a penalty keeps many centres from fitting the noise.
     #[test]
-    fn a_penalty_is_chosen_where_data_are_noisy_and_the_grid_grows_to_it() {
+    fn a_penalty_is_chosen_for_noisy_data_and_the_grid_reaches_it() {
         let mut dataset = dataset(&["y"]).subset(&(0..150).collect::<Vec<_>>());
         let mut random = Random::new(8, Stream::Training, Purpose::Noise, 0, 0);
         dataset.outputs.values.iter_mut().for_each(|y| *y += 0.3 * random.normal());

@@ -252,7 +252,7 @@ mod tests {
     use crate::metrics::Definition;
 
     #[test]
-    fn only_a_table_that_the_papers_could_be_stands_beside_the_printed_cells() {
+    fn only_a_table_of_the_papers_settings_is_compared_with_it() {
         let paper = Experiment::load("paper").unwrap();
         let is_beside = |change: fn(&mut Experiment)| {
             let mut changed = paper.clone();
@@ -286,7 +286,7 @@ mod tests {
     }
 
     #[test]
-    fn no_cell_of_the_papers_table_is_worse_than_the_mean_by_more_than_two_per_cent() {
+    fn no_cell_of_the_papers_table_is_2_percent_worse_than_the_mean() {
         // Two rows of eight that are alike, and the least and the greatest of the table's widths and noise levels.
         let mut text = Experiment::text("paper").unwrap().into_owned();
         for (from, to) in [

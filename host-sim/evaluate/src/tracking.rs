@@ -211,7 +211,7 @@ mod tests {
     }
 
     #[test]
-    fn a_contact_that_moves_is_tracked_to_two_thirds_of_a_filters_error() {
+    fn a_tracker_has_two_thirds_of_the_error_of_a_filter() {
         let (mut scene, blob) = trained();
         let [_, filtered, tracked] = errors(&scene, &blob);
         assert!(tracked < 0.66 * filtered && tracked < 0.018, "{tracked} {filtered}");
@@ -276,7 +276,7 @@ mod tests {
     }
 
     #[test]
-    fn scenes_without_a_single_contact_or_deformations_have_no_tracker() {
+    fn a_tracker_needs_a_single_contact_and_deformations() {
         for (name, words) in
             [("paper", "of one contact"), ("contact", "outputs that are deformations")]
         {

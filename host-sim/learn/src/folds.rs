@@ -120,7 +120,7 @@ mod tests {
     }
 
     #[test]
-    fn the_output_with_fewest_frames_tells_how_many_there_are_to_train_on() {
+    fn the_output_with_fewest_frames_limits_the_training_part() {
         let outputs = |y: f64| {
             let values = vec![1.0, y, 2.0, y, 3.0, 4.0, 5.0, 6.0];
             Table { names: ["f", "y"].map(String::from).to_vec(), values: values.into() }

@@ -198,7 +198,7 @@ mod tests {
     }
 
     #[test]
-    fn six_directions_of_a_row_are_observable_at_half_a_per_cent_the_last_one_hardly() {
+    fn six_directions_of_a_row_are_observable_at_half_a_percent() {
         let world = World::paper();
         for row in 0..8 {
             let found = of_rows(&world, &[row]);
@@ -217,7 +217,7 @@ mod tests {
     }
 
     #[test]
-    fn where_the_sensor_is_nearly_linear_the_prediction_is_the_limit() {
+    fn the_prediction_is_the_limit_for_a_nearly_linear_sensor() {
         let mut world = World { read_rows: vec![3], ..World::paper() };
         world.noise.level = 0.02;
         let limits = Reference::new(&world, 40, &Silent).unwrap().limits();

@@ -341,7 +341,7 @@ mod tests {
     }
 
     #[test]
-    fn points_are_where_electrodes_are_pressed_to_and_pictures_have_rows() {
+    fn points_are_displaced_electrodes_and_pictures_have_rows() {
         let column = |name: &str| crate::Column { name: name.into(), unit: "mm".into() };
         let outputs = [Some(1), None, Some(0)];
         let place_mm = [1000.0, 2000.0, 500.0];

@@ -157,7 +157,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn averaging_lowers_white_noise_by_the_root_and_the_rest_by_its_memory() {
+    fn averaging_reduces_white_noise_more_than_correlated_noise() {
         let noise = Noise {
             correlated_level: 0.03,
             time_constant_ms: 20.0,

@@ -285,7 +285,7 @@ mod tests {
     }
 
     #[test]
-    fn a_slide_without_presses_keeps_its_depth_and_a_press_in_place_its_centre() {
+    fn a_slide_keeps_its_depth_and_a_press_in_place_its_centre() {
         let slide = paths(&Path::at(20.0, 0.0));
         assert_eq!(slide.at(0.0).1, slide.at(0.37).1);
         assert!(slide.at(0.0).1.iter().all(|depth_mm| *depth_mm >= 0.3));

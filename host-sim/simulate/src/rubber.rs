@@ -161,7 +161,7 @@ mod tests {
     }
 
     #[test]
-    fn a_load_that_sets_in_reaches_its_instant_share_and_creeps_to_the_rest() {
+    fn a_load_step_reaches_its_instant_share_and_creeps_to_the_rest() {
         for (share, constant_ms) in [(0.7, 80.0), (0.0, 5.0), (1.0, 80.0), (0.4, 1e6)] {
             let solid = StandardLinearSolid { instant_share: share, time_constant_ms: constant_ms };
             let mut response = solid.at_rest(1).unwrap();

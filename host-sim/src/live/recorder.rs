@@ -120,7 +120,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_recording_is_replayed_with_its_baseline_its_truth_and_what_was_said_of_its_frames() {
+    fn a_recording_is_replayed_with_baseline_truth_and_status() {
         let columns = |names: &[&str]| sheet::columns(names.iter().copied(), []);
         let layout = sheet::layout("", columns(&["a", "b"]), columns(&["x_mm", "load_n"]), None);
         let folder = std::env::temp_dir().join(format!("taxel-recorder-{}", std::process::id()));

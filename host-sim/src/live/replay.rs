@@ -445,7 +445,7 @@ mod tests {
     }
 
     #[test]
-    fn lines_of_a_data_file_come_at_their_times_and_those_sought_too() {
+    fn lines_of_a_data_file_are_replayed_at_their_times() {
         let text = "time_s,r1c1_ohm,r1c2_ohm,load_g\n5,1,2,9\n5.5,3,4,9\n6.5,5,6,9\n8,7,8,9\n";
         let path = Path::new("log.csv");
         let file =

@@ -383,7 +383,7 @@ mod tests {
     }
 
     #[test]
-    fn names_cover_neither_each_other_nor_marks_and_stay_within_the_panel() {
+    fn labels_overlap_nothing_and_stay_within_the_panel() {
         let written = |y: f64, marks: Vec<[f64; 2]>| {
             let mut chart = chart(Mark::Names((0..40).map(|i| format!("K {i}")).collect()), &[]);
             chart.series[0].points = (0..40).map(|i| [0.1 * f64::from(i), y]).collect();

@@ -425,7 +425,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn fields_whose_last_names_are_alike_have_their_paths_for_headings() {
+    fn fields_with_the_same_last_name_have_their_paths_as_headings() {
         let fields = ["sensor.size_mm.0", "sensor.size_mm.2", "training.each_row"];
         assert_eq!(headings(&fields), ["sensor.size_mm.0", "sensor.size_mm.2", "each row"]);
         assert_eq!(headings(&fields[1..]), ["size mm", "each row"]);

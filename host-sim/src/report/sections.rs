@@ -215,7 +215,7 @@ mod tests {
     }
 
     #[test]
-    fn csv_and_json_have_the_columns_of_text_unrounded_and_those_that_programs_read() {
+    fn csv_and_json_have_the_columns_of_text_unrounded_and_more() {
         let rows = [("d,z", Some([0.037_123, 0.0002]), 7), ("dx", None, 8)];
         let table = TableOf::new(&rows, "Errors.")
             .names("output", "output", |row| row.0.into())

@@ -3,7 +3,7 @@
 use crate::common::{Folder, small_scene};
 
 #[test]
-fn a_full_reading_model_is_judged_and_writes_it_beside_the_outputs() {
+fn a_full_reading_model_is_evaluated_and_adds_output_columns() {
     let folder = Folder::new("confidence");
     folder.write("scene.toml", small_scene());
     folder.succeed(&["train", "scene.toml", "--reading-model", "full", "-o", "model.bin"]);

@@ -19,7 +19,7 @@ fn log() -> String {
 }
 
 #[test]
-fn a_log_trains_the_same_in_another_dialect_and_its_fields_are_kept_as_they_are_written() {
+fn a_log_in_another_dialect_trains_the_same_model() {
     let folder = Folder::new("data-files");
     folder.write("log.csv", log());
     let names = "t (ns);a;b;f\n;V;V;N\n";

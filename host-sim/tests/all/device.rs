@@ -416,7 +416,7 @@ pub mod serial_port {
     }
 
     #[test]
-    fn what_a_device_is_unsure_of_is_recorded_as_the_host_computes_it() {
+    fn a_devices_confidence_is_recorded_as_the_host_computes_it() {
         let folder = Folder::new("recorded_confidence");
         let train = ["train", "contact", "-n", "1500", "--no-refine", "--centres", "6"];
         folder.succeed(&[&train[..], &["--reading-model", "full", "-o", "c.bin"]].concat());

@@ -3,7 +3,7 @@
 use crate::common::{Folder, rmse, small_scene};
 
 #[test]
-fn a_user_trains_on_a_csv_file_and_decodes_a_drifted_sensor_with_its_own_baseline() {
+fn a_user_decodes_a_drifted_sensor_with_its_own_baseline() {
     let folder = Folder::new("drift-csv");
     folder.write("scene.toml", small_scene());
     let synth = |seed: &str, scale: &str, data: &str, rest: &str| {

@@ -33,7 +33,7 @@ fn sources_in_testdata_are_those_that_the_command_writes() {
 }
 
 #[test]
-fn a_source_in_rust_has_functions_for_the_parts_of_its_model_alone() {
+fn an_export_to_rust_has_functions_only_for_parts_of_its_model() {
     let folder = Folder::new("export_rust");
     folder.write("scene.toml", small_scene().replace("frames = 3000", "frames = 400"));
     let functions = ["pub fn decode(", "pub fn assess(", "pub fn fill("];
@@ -69,7 +69,7 @@ fn a_source_that_leaves_the_tracker_out_says_so() {
 }
 
 #[test]
-fn a_library_in_c_is_a_whole_folder_under_the_name_that_was_given() {
+fn an_export_to_c_is_a_whole_library_with_the_given_name() {
     let folder = Folder::new("export_c");
     let blob = in_testdata("array-fixed16-confidence.bin");
     let export = ["export", &blob, "--c", "lib/mat", "--name", "mat"];

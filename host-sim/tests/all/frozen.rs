@@ -47,7 +47,7 @@ fn hold_estimates(folder: &Folder, name: &str, train: &str, frames: &str) {
 }
 
 #[test]
-fn synthesised_frames_and_estimates_of_the_papers_shape_are_the_frozen_ones() {
+fn frames_and_estimates_of_the_papers_shape_are_frozen() {
     let folder = Folder::new("frozen-press");
     run(&folder, "synth press --noise 0.005 --seed 11 -n 2 -o press.csv --quiet");
     hold("press.csv", &std::fs::read_to_string(folder.path("press.csv")).unwrap());
@@ -122,7 +122,7 @@ fn the_limit_is_the_frozen_one_within_two_standard_errors() {
 
 /// What `cargo xtask cycles` accepts. A frame may take fewer instructions than it did, and none more.
 #[test]
-fn no_accepted_shape_takes_more_instructions_than_the_frozen_ones() {
+fn no_shape_takes_more_instructions_than_the_frozen_ones() {
     let accepted = concat!(env!("CARGO_MANIFEST_DIR"), "/../firmware/cycles.csv");
     let accepted = std::fs::read_to_string(accepted).unwrap();
     let expected = std::fs::read_to_string(frozen("instructions.csv")).unwrap();

@@ -134,7 +134,7 @@ impl Rig {
 }
 
 #[test]
-fn whenever_the_host_of_an_upload_dies_the_device_scans_on_with_the_old_model_or_the_new() {
+fn a_device_keeps_a_whole_model_when_the_uploading_host_dies() {
     let models = [model(3), model(4)];
     let rig = Rig::new("killed", models[0].bytes());
     let files = models.each_ref().map(|model| model.parse().crc());
@@ -205,7 +205,7 @@ fn a_model_on_trial_is_left_by_a_restart_unless_it_is_confirmed() {
 }
 
 #[test]
-fn a_recording_that_is_interrupted_leaves_no_file_and_the_device_as_it_was() {
+fn an_interrupted_recording_leaves_no_file_and_the_device_scans() {
     let rig = Rig::new("interrupted", model(3).bytes());
     // The last request lets the device scan for the host: it identifies, pauses, configures, and captures. A recording asks
     // for the device's own configuration as well.
@@ -220,7 +220,7 @@ fn a_recording_that_is_interrupted_leaves_no_file_and_the_device_as_it_was() {
 }
 
 #[test]
-fn what_a_dead_host_has_left_is_seen_and_ends_with_the_next_ones_work() {
+fn a_paused_device_is_reported_and_the_next_command_resumes_it() {
     let rig = Rig::new("dead", model(3).bytes());
     let recording = ["record", "-n", "50000", "-o", "x.csv", "--period-us", "1000"];
     assert!(rig.end_at(&recording, 3, End::Kill).1);
@@ -293,7 +293,7 @@ fn liar(frames: &'static [(u32, u64, usize)]) -> String {
 }
 
 #[test]
-fn a_frame_of_another_length_is_refused_and_a_number_may_wrap_around() {
+fn a_frame_of_wrong_length_is_refused_and_a_number_may_wrap() {
     let folder = Folder::new("liar");
     let port = liar(&[(1, 10, 144), (2, 20, 3), (3, 30, 144)]);
     let output = folder.run(&["link", &port, "record", "-n", "3", "-o", "x.csv"]);

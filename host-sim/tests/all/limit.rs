@@ -30,7 +30,7 @@ fn models_are_judged_on_the_frames_of_the_limit() {
 }
 
 #[test]
-fn several_scenes_stand_in_one_table_with_the_figures_of_each_alone() {
+fn several_scenes_share_a_table_with_the_figures_of_each_alone() {
     let folder = Folder::new("limit-scenes");
     folder.write("one.toml", small_scene().replace("name = \"small\"", "name = \"one\""));
     folder.write("two.toml", tiny_scene());

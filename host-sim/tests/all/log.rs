@@ -42,7 +42,7 @@ fn warnings(document: &Value) -> Vec<&str> {
 }
 
 #[test]
-fn a_drift_at_rest_is_named_and_the_baseline_of_each_pause_takes_it_out() {
+fn drift_at_rest_is_reported_and_removed_by_renewed_baselines() {
     let folder = Folder::new("log-drift");
     folder.write("log.csv", log(0.2));
     let run = [&["run", "log.csv"], &COLUMNS[..]].concat();
@@ -97,7 +97,7 @@ fn places_that_are_logged_in_pauses_count_as_missing() {
 }
 
 #[test]
-fn a_model_with_relative_inputs_takes_the_baseline_from_the_log_that_it_decodes() {
+fn a_model_with_relative_inputs_takes_its_baseline_from_the_log() {
     let folder = Folder::new("log-relative");
     folder.write("log.csv", log(0.2));
     let train =

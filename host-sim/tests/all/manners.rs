@@ -3,7 +3,7 @@
 use crate::common::{Folder, tiny_scene};
 
 #[test]
-fn quiet_work_says_nothing_and_verbose_work_the_time_of_each_stage() {
+fn quiet_runs_print_no_notes_and_verbose_runs_print_times() {
     let folder = Folder::new("manners");
     folder.write("scene.toml", tiny_scene());
     let run = ["run", "scene.toml", "--no-refine"];

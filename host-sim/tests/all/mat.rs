@@ -38,7 +38,7 @@ const TRAIN: [&str; 9] = [
 ];
 
 #[test]
-fn a_mat_of_numbered_columns_is_named_after_its_wires_and_inspect_tells_its_image() {
+fn a_mat_of_numbered_columns_is_named_by_wires_and_has_an_image() {
     let folder = Folder::new("mat");
     folder.write("mat.csv", log([16, 16], 200));
     let output = folder.run(&[&TRAIN[..], &["--centres", "8"]].concat());

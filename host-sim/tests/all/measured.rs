@@ -71,7 +71,7 @@ fn outliers_are_named_left_out_and_listed_in_json() {
 }
 
 #[test]
-fn dead_constant_and_duplicated_inputs_are_named_and_left_out_and_stop_nothing() {
+fn dead_constant_and_duplicate_inputs_are_named_and_left_out() {
     let folder = Folder::new("measured-unused");
     let mut text = String::from("a,b,dead,flat,twin,bit,y\n");
     for (i, [a, b, y]) in lines(200).into_iter().enumerate() {

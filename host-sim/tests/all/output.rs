@@ -141,7 +141,7 @@ fn an_open_file_that_is_read_is_not_written() {
 }
 
 #[test]
-fn a_signal_leaves_the_old_file_and_no_temporary_and_a_kill_a_hidden_one() {
+fn a_signal_leaves_no_temporary_file_and_a_kill_a_hidden_one() {
     let folder = Folder::new("signals");
     folder.write("y.csv", "old");
     let synth = ["synth", "press", "-n", "20000", "-o", "y.csv"];

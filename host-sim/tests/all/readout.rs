@@ -93,7 +93,7 @@ fn every_reading_stays_within_the_bound_of_quantisation() {
 }
 
 #[test]
-fn switches_and_leads_are_taken_out_of_readings_while_the_sensor_is_pressed() {
+fn resistances_of_switches_and_leads_are_removed_from_readings() {
     let series = Series { row_switch: 0.26, lead: 0.1 };
     let pairs = scanned(series, WIRES, 40);
     assert!(rms(&pairs) < 4e-4, "{}", rms(&pairs));

@@ -292,7 +292,7 @@ fn a_plan_trains_as_the_same_options_of_a_command_do() {
 
 /// Centres do not depend on the spread, and unless they are refined neither on the penalty.
 #[test]
-fn points_that_share_centres_and_decompositions_have_the_results_that_each_has_alone() {
+fn points_that_share_work_have_the_results_of_each_alone() {
     let folder = prepared("sweep_shared");
     let wanted = "limit_frames = 0\n[set]\ntraining.frames = 60\ntraining.test_frames = 20\n[axes]\n\
                   training.refine = [false, true]\ntraining.spread = [0.5, 0.8]\ntraining.penalty = [1e-7, 1e-3]\n";
@@ -383,7 +383,7 @@ fn measurements_are_swept_by_the_settings_of_training() {
 }
 
 #[test]
-fn a_point_fails_alone_whose_scene_has_not_what_its_device_asks_for() {
+fn a_point_whose_scene_lacks_what_its_device_needs_fails_alone() {
     let folder = prepared("sweep_devices");
     folder.write(
         "plan.toml",

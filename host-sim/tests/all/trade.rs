@@ -136,7 +136,7 @@ fn every_knob_has_its_points_and_the_front_is_the_pareto_front() {
 }
 
 #[test]
-fn the_chosen_point_is_the_cheapest_and_its_blob_is_what_the_table_says() {
+fn the_chosen_point_is_the_cheapest_and_its_blob_is_as_stated() {
     let (planned, trade) = traded();
     let mut trade = trade.clone();
     trade.choose(&at_most("rmse_dz_mm", 0.04)).unwrap();

@@ -123,7 +123,7 @@ fn numbers(values: &Value) -> Vec<f64> {
 }
 
 #[test]
-fn a_device_is_shown_under_the_names_that_its_checksums_tell_and_recorded_and_zeroed() {
+fn a_device_is_shown_with_names_by_checksum_recorded_and_zeroed() {
     let folder = Folder::new("view_device");
     let blob = model(8);
     folder.write("press.bin", blob.bytes());
@@ -232,7 +232,7 @@ fn a_recording_is_paused_sought_and_stepped_through() {
 }
 
 #[test]
-fn a_data_file_of_any_columns_is_decoded_by_its_model_and_a_line_of_numbers_too() {
+fn data_files_and_lines_of_numbers_are_decoded_by_their_model() {
     use std::fmt::Write as _;
     let folder = Folder::new("view_mat");
     let mut text = String::from("a,b,c,force_n\n");
@@ -288,7 +288,7 @@ fn a_data_file_of_any_columns_is_decoded_by_its_model_and_a_line_of_numbers_too(
 }
 
 #[test]
-fn frames_of_another_firmware_are_shown_in_the_shape_that_is_given() {
+fn frames_of_other_firmware_are_shown_in_the_given_shape() {
     let folder = Folder::new("view_flexitac");
     let (name, near, mut far) = terminal();
     drop(near);
@@ -313,7 +313,7 @@ fn frames_of_another_firmware_are_shown_in_the_shape_that_is_given() {
 }
 
 #[test]
-fn a_line_that_was_lost_is_opened_again_and_meanwhile_the_page_says_what_is_wrong() {
+fn a_lost_port_is_reopened_and_the_page_says_what_is_wrong() {
     let folder = Folder::new("view_reconnects");
     let port = folder.path("port");
     // A port that is unplugged and plugged in again: a link to one terminal after another.

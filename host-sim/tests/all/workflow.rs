@@ -91,7 +91,7 @@ fn same_seed_same_bytes_on_one_thread_and_on_two() {
 }
 
 #[test]
-fn run_writes_a_whole_folder_and_its_blob_is_the_one_that_train_writes() {
+fn run_writes_a_whole_folder_with_the_same_blob_as_train() {
     let folder = Folder::new("run");
     folder.write("scene.toml", small_scene_with_table1());
     let printed = json(&untimed(&folder.succeed(&["run", "scene.toml", "--json"])));

@@ -138,7 +138,7 @@ fn many_idle_connections_do_not_keep_others_out() {
 }
 
 #[test]
-fn a_sixth_viewer_is_refused_in_words_and_the_place_is_free_later() {
+fn a_sixth_viewer_is_refused_with_a_reason_and_may_come_later() {
     let (view, _commands, port) = start();
     view.set_status(Status::default());
     let request = format!("GET /events?token={TOKEN} HTTP/1.1\r\nHost: localhost\r\n\r\n");

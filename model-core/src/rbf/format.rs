@@ -76,7 +76,7 @@ mod tests {
     use super::Format;
 
     #[test]
-    fn names_tags_and_descriptions_are_distinct_and_lead_back_to_their_format() {
+    fn formats_have_distinct_names_tags_and_descriptions() {
         for (index, format) in Format::ALL.into_iter().enumerate() {
             assert_eq!(Format::from_name(format.name()), Some(format));
             assert_eq!(Format::from_tag(format.tag()), Some(format));

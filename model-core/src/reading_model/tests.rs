@@ -56,7 +56,7 @@ fn novelty_and_deviations_are_those_of_the_mixture() {
 }
 
 #[test]
-fn far_away_frames_are_novel_and_missing_readings_have_no_novelty() {
+fn distant_frames_are_novel_and_incomplete_ones_have_no_novelty() {
     let (near, _) = assess_by(&block(), [12.0, 21.0, 30.2]);
     let (far, deviation) = assess_by(&block(), [112.0, 21.0, 30.2]);
     assert!(near < 0.0 && far > 100.0 && deviation.iter().all(|d| d.is_finite()));
@@ -132,7 +132,7 @@ fn what_cannot_be_a_reading_model_is_refused() {
 }
 
 #[test]
-fn slices_of_other_lengths_are_refused_and_a_model_without_components_tells_nothing() {
+fn wrong_lengths_are_refused_and_no_components_give_no_novelty() {
     let block = block();
     let model = ReadingModel::new(SIZES, &block).unwrap();
     let frame = [12.0, 21.0, 30.2];

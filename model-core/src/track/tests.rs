@@ -138,7 +138,7 @@ fn readings_that_are_missing_do_not_count() {
 }
 
 #[test]
-fn what_no_contact_explains_is_left_to_the_network_until_one_does() {
+fn a_frame_that_no_contact_explains_is_decoded_by_the_network() {
     let (largest, explained) = track(300, |frame, ohm| {
         if (100..105).contains(&frame) {
             ohm.iter_mut().step_by(2).for_each(|ohm| *ohm *= 1.2);
@@ -239,7 +239,7 @@ fn a_walk_spreads_as_its_covariance_says() {
 }
 
 #[test]
-fn floats_that_no_tracker_has_are_refused_and_no_number_makes_it_panic() {
+fn bad_tracker_parameters_are_refused_and_no_number_panics() {
     let good = block();
     let found = good.len() - 1;
     let wrong = NetworkError::Length { what: "tracker", expected: good.len(), found };

@@ -203,7 +203,7 @@ mod tests {
     }
 
     #[test]
-    fn a_bridge_is_told_from_a_swap_and_a_short_from_an_op_amp_at_the_rail() {
+    fn bridges_swaps_shorts_and_saturated_op_amps_are_distinguished() {
         let with = |pin: usize, up, down, along| {
             let mut found = sound();
             (found.pulled_up[pin], found.pulled_down[pin]) = (up, down);

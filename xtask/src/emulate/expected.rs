@@ -57,7 +57,7 @@ mod tests {
     }
 
     #[test]
-    fn lines_too_many_and_too_few_are_shown_once_and_so_is_a_missing_end_of_line() {
+    fn extra_lines_missing_lines_and_line_ends_are_shown_once() {
         assert!(compare("a\n", "a").is_err() && compare("a\n", "a\n").is_ok());
         let difference = compare("a\na\n", "a\n").unwrap_err();
         assert_eq!(difference, "from line 2 on, - expected, + found\n        - a");

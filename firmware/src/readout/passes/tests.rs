@@ -91,7 +91,7 @@ fn scan(
 const ONCE: ScanSettings = ScanSettings { settling_us: 20, oversampling: 1 };
 
 #[test]
-fn a_scan_by_passes_is_what_the_circuit_makes_of_the_same_counts() {
+fn a_scan_by_passes_computes_what_the_circuit_does() {
     for columns in [0b111, 0b101, 0b010] {
         let (table, mut scanner) = passes(2);
         let wires = Selection { rows: &BOTH, columns: ColumnWires(columns) };
@@ -123,7 +123,7 @@ fn a_scan_by_passes_is_what_the_circuit_makes_of_the_same_counts() {
 }
 
 #[test]
-fn rows_idle_in_the_first_of_sixteen_scans_and_behind_what_changes() {
+fn rows_idle_in_the_first_of_sixteen_scans_and_after_changes() {
     let (table, mut scanner) = passes(0);
     let scan = |scanner: &mut Passes, settings| {
         let mut frame = [0.0; 6];

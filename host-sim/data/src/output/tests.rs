@@ -75,7 +75,7 @@ fn whichever_step_fails_files_are_whole_and_no_temporary_stays() {
 }
 
 #[test]
-fn files_of_several_folders_are_all_written_before_the_first_is_renamed() {
+fn files_of_several_folders_are_written_before_any_is_renamed() {
     let around = tempfile::tempdir().unwrap();
     let folders = ["one", "two"].map(|name| around.path().join(name));
     let (steps, outcome) = steps_of(0, || {
@@ -89,7 +89,7 @@ fn files_of_several_folders_are_all_written_before_the_first_is_renamed() {
 }
 
 #[test]
-fn whenever_the_program_is_killed_or_the_power_goes_files_are_whole() {
+fn files_are_whole_after_a_kill_or_a_loss_of_power() {
     let folder = tempfile::tempdir().unwrap();
     let all = |text: &'static [u8]| [("model", text), ("metrics", text), ("table", text)];
     SET.write(folder.path(), &all(b"old")).unwrap();
@@ -138,7 +138,7 @@ fn a_check_leaves_no_folder_and_no_file() {
 
 #[cfg(unix)]
 #[test]
-fn links_are_followed_permissions_are_kept_and_read_only_files_are_refused() {
+fn links_are_followed_modes_kept_and_read_only_files_refused() {
     use std::os::unix::fs::{PermissionsExt, symlink};
     let folder = tempfile::tempdir().unwrap();
     let path = |name: &str| -> PathBuf { folder.path().join(name) };
@@ -233,7 +233,7 @@ fn whichever_step_fails_a_new_folder_is_whole_or_not_there() {
 }
 
 #[test]
-fn a_folder_that_is_there_keeps_other_files_and_takes_new_ones_together() {
+fn an_existing_folder_keeps_its_files_and_takes_all_new_ones() {
     let folder = tempfile::tempdir().unwrap();
     write_folder(folder.path(), &texts("old")).unwrap();
     fs::write(folder.path().join("notes"), "mine").unwrap();

@@ -5,7 +5,7 @@ use taxel_simulate::sensor::Sensor;
 use super::*;
 
 #[test]
-fn embedded_scenes_are_sound_named_as_they_are_called_and_the_worlds_in_code() {
+fn built_in_scenes_are_valid_and_equal_the_worlds_in_code() {
     for (name, _) in crate::scenes::ALL {
         let scene = Experiment::load(name).unwrap();
         assert_eq!(scene.name, name);
@@ -93,7 +93,7 @@ fn forces_have_their_own_full_scale_and_values() {
 }
 
 #[test]
-fn full_scales_of_a_contact_are_the_face_and_the_largest_contact() {
+fn full_scales_are_the_face_and_the_largest_contact() {
     let scene = Experiment::load("contact").unwrap();
     let [x, y, depth, force] = scene.world.full_scales()[..] else { panic!("four outputs") };
     assert_eq!((x, y, depth), (20.0, 18.0, 1.0));
@@ -121,7 +121,7 @@ fn counts_are_checked_before_memory_is_taken_for_them() {
 }
 
 #[test]
-fn electrodes_and_frames_whose_computing_takes_hours_are_refused() {
+fn scenes_that_take_hours_to_compute_are_refused() {
     let of_columns = "\ncolumn_wires = 18\nelectrodes_per_column_wire = 3";
     let wires = |electrodes: u32| {
         format!("\ncolumn_wires = 10000\nelectrodes_per_column_wire = {electrodes}")
@@ -148,7 +148,7 @@ fn deep_nesting_is_refused_and_quoted_in_part_only() {
 
 /// Scenes with a character or a digit changed, cut short, or with a line of another place.
 #[test]
-fn a_damaged_scene_is_refused_or_synthesised_to_positive_readings() {
+fn a_damaged_scene_is_refused_or_gives_positive_readings() {
     let mut random = Random::new(1, Stream::Test, Purpose::Damage, 0, 0);
     let mut taken = 0;
     for case in 0..600 {

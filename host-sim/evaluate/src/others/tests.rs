@@ -28,7 +28,7 @@ fn warning(contacts: &[(&str, f64, f64, Option<f64>)]) -> Option<String> {
 }
 
 #[test]
-fn contacts_that_are_much_worse_by_either_measure_are_warned_of_with_what_to_do() {
+fn contacts_with_much_larger_errors_give_a_warning_with_advice() {
     // Not more than 1.5 times the RMSE, nor 1.5 times the share of the deviation: √0.09/√0.04.
     assert_eq!(warning(&[("edge", 0.0599, 0.9101, None)]), None);
     let by_rmse = warning(&[("edge", 0.0601, 0.97, None)]).unwrap();
@@ -47,7 +47,7 @@ fn contacts_that_are_much_worse_by_either_measure_are_warned_of_with_what_to_do(
 }
 
 #[test]
-fn contacts_that_novelty_notices_and_outputs_that_are_hardly_decoded_are_not_warned_of() {
+fn novel_contacts_and_poorly_decoded_outputs_give_no_warning() {
     assert_eq!(warning(&[("edge", 0.09, 0.5, Some(90.0))]), None);
     let missed = warning(&[("edge", 0.09, 0.5, Some(89.9))]).unwrap();
     assert!(missed.ends_with("believe no estimate that is novel"), "{missed}");

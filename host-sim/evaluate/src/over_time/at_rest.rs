@@ -181,7 +181,7 @@ mod tests {
     use taxel_data::table::Table;
 
     #[test]
-    fn a_drift_at_rest_is_told_from_noise_and_from_what_presses_leave() {
+    fn drift_at_rest_is_distinguished_from_noise_and_from_creep() {
         let clock = Clock {
             column: Some("time_s".into()),
             unit: "s",

@@ -78,7 +78,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_constant_is_105_hundredths_of_a_point_off_and_the_paper_itself_nothing() {
+    fn the_gap_to_the_paper_is_0_for_itself_and_1_05_for_a_constant() {
         let constant = Nearness::of_a_constant();
         assert!((constant.gap - 1.05).abs() < 0.005, "{constant:?}");
         assert_eq!(constant.correlation, None);

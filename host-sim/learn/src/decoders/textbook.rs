@@ -146,7 +146,7 @@ mod tests {
     }
 
     #[test]
-    fn as_many_centres_as_lines_interpolate_and_a_large_penalty_predicts_nothing() {
+    fn centres_at_all_lines_interpolate_without_a_penalty() {
         let table = table();
         let mut random = Random::new(1, Stream::Training, Purpose::Centres, 0, 0);
         let hidden = Arc::new(Textbook::new(&table, 40, &mut random));

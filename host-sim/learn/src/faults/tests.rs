@@ -129,7 +129,7 @@ fn every_window_has_frames_enough_and_all_frames_are_in_one() {
 }
 
 #[test]
-fn what_comes_and_goes_is_named_and_counted_in_the_frames_that_it_strikes() {
+fn intermittent_faults_are_named_and_counted_by_frame() {
     let (sound, factors) = sensor();
     let (factors, none) = (Some(&factors), None);
     let told = |readings: &Table, factors: Option<&Factors>, expected: &[(&str, usize)]| {

@@ -108,7 +108,7 @@ fn the_rule_finds_the_least_error_of_a_simulation() {
 }
 
 #[test]
-fn a_fast_output_is_extrapolated_by_its_age_and_a_slow_noisy_one_is_not() {
+fn fast_outputs_are_extrapolated_and_slow_noisy_ones_are_not() {
     let of = |noise: f64, rate_per_s: f64| {
         let movement = Movement { rate_per_s, acceleration_per_s2: 80.0 };
         settings_for(noise, movement, 5600.0, 5700.0).lead_us

@@ -31,7 +31,7 @@ fn row_4() -> &'static (World, Dataset, ModelBlob, ModelBlob) {
 }
 
 #[test]
-fn intervals_cover_the_errors_of_frames_that_nothing_was_fitted_to() {
+fn intervals_cover_the_errors_of_frames_not_used_for_fitting() {
     let (world, _, _, blob) = row_4();
     let test = synthesise(world, Stream::Test, 4000);
     let model = blob.prepare();
@@ -71,7 +71,7 @@ fn frames_that_the_sensor_cannot_give_are_novel() {
 }
 
 #[test]
-fn a_reading_model_changes_no_estimate_and_a_device_finds_the_same_bits() {
+fn a_reading_model_changes_no_estimate_and_devices_agree() {
     let (world, training, without, with) = row_4();
     let test = synthesise(world, Stream::Test, 50);
     let prepared = with.prepare();

@@ -39,7 +39,7 @@ fn the_standard_network_interpolates_its_samples_exactly() {
 }
 
 #[test]
-fn penalties_that_share_a_decomposition_give_the_networks_that_each_gives_alone() {
+fn penalties_fitted_together_give_the_networks_of_each_alone() {
     let table = table(3000, 0.05);
     let samples = Samples::new(&table);
     let penalties = [None, Some(1e-9), Some(1e-5), Some(1e-2)];
@@ -81,7 +81,7 @@ fn a_penalty_is_for_each_frame() {
 }
 
 #[test]
-fn training_that_takes_more_memory_than_is_allowed_is_refused_before_it_is_taken() {
+fn training_beyond_the_memory_bound_is_refused_in_advance() {
     let names = |count: usize| (0..count).map(|column| format!("c{column}")).collect();
     let wide = Dataset::empty(names(20_000), vec!["y".into()], 1, 60);
     let options = Options { centres: 10, ..Options::of_rows() };
@@ -121,7 +121,7 @@ fn alone(table: &Dataset, column: usize) -> Dataset {
 }
 
 #[test]
-fn each_output_has_the_network_that_the_lines_with_it_alone_would_give() {
+fn each_output_has_the_network_that_its_own_lines_give_alone() {
     let table = with_missing_outputs(3000);
     let samples = Samples::new(&table);
     let mut solvers = vec![(Format::F32, Solver::Rls)];
@@ -147,7 +147,7 @@ fn each_output_has_the_network_that_the_lines_with_it_alone_would_give() {
 }
 
 #[test]
-fn the_linear_decoder_fits_each_output_on_the_lines_that_have_it() {
+fn the_linear_decoder_fits_each_output_on_lines_that_have_it() {
     let table = with_missing_outputs(2000);
     let fit = |table: &Dataset| LinearRow::fit(table, &(0..table.frames()).collect::<Vec<_>>());
     let together = fit(&table).predict(&table.inputs.values);

@@ -19,7 +19,7 @@ const SENSORS: [(&str, ModelShape, usize); 6] = [
 ];
 
 #[test]
-fn a_sensor_that_leaves_something_out_takes_less_and_the_page_says_what_each_takes() {
+fn sensors_with_fewer_parts_cost_less_as_the_page_says() {
     let page = include_str!("../../../../docs/cycles.md");
     let mut table = String::new();
     let takes = |(_, shape, centres): (&str, ModelShape, usize)| {

@@ -212,7 +212,7 @@ fn check(seed: u64, model: impl Fn(&mut Draw, Format) -> [usize; 2]) {
 }
 
 #[test]
-fn tables_of_networks_of_rows_are_decoded_as_a_device_decodes_frames() {
+fn tables_of_row_networks_are_decoded_as_on_a_device() {
     check(1, |draw, format| {
         let [inputs, centres, outputs] = [draw.size(40), draw.size(70), draw.size(20)];
         let shape = ModelShape { rows: draw.size(4), inputs, outputs };
@@ -223,7 +223,7 @@ fn tables_of_networks_of_rows_are_decoded_as_a_device_decodes_frames() {
 }
 
 #[test]
-fn tables_of_networks_of_frames_are_decoded_as_a_device_decodes_frames() {
+fn tables_of_frame_networks_are_decoded_as_on_a_device() {
     check(2, |draw, format| {
         let (readings, parts) = (draw.size(150), draw.size(3));
         let (mut fronts, mut networks) = (vec![], vec![]);

@@ -143,7 +143,7 @@ fn what_is_no_recording_is_refused_with_what_it_lacks() {
 }
 
 #[test]
-fn a_compressed_recording_is_refused_by_the_name_of_its_compression() {
+fn a_refusal_of_a_compressed_recording_names_the_compression() {
     let layout = electrodes();
     let bytes = recording(&layout, &frames(&layout, 3));
     let mut copy = bytes[..8].to_vec();

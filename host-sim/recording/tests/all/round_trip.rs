@@ -120,7 +120,7 @@ fn a_file_that_is_cut_anywhere_keeps_all_its_whole_chunks() {
 }
 
 #[test]
-fn chunks_that_are_not_whole_are_left_out_and_their_bytes_counted() {
+fn damaged_chunks_are_skipped_and_their_bytes_counted() {
     let folder = Folder::new();
     let path = folder.path("damaged");
     let written = frames(&electrodes(), 3);
@@ -218,7 +218,7 @@ fn only_recordings_are_replaced_and_none_that_is_being_written() {
 }
 
 #[test]
-fn a_layout_that_cannot_be_recorded_is_refused_before_any_file_is_touched() {
+fn a_bad_layout_is_refused_before_any_file_is_touched() {
     let folder = Folder::new();
     let path = folder.path("layout");
     let changes: [fn(&mut Layout, &mut Extras); 9] = [

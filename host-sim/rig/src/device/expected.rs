@@ -203,7 +203,7 @@ mod tests {
     }
 
     #[test]
-    fn one_bit_of_an_output_or_of_its_confidence_makes_a_frame_another() {
+    fn one_bit_of_an_output_or_a_confidence_makes_frames_differ() {
         let plain = expected(Vec::new());
         assert!(plain.is_same(1, &estimate(&[0.0, 1.0], &[])));
         assert!(!plain.is_same(1, &estimate(&[0.0, 1.0], &[0.5, 0.5])));

@@ -123,7 +123,7 @@ impl SharedBytes for Torn {
 }
 
 #[test]
-fn every_byte_arrives_once_and_in_order_however_accesses_are_torn() {
+fn every_byte_arrives_once_in_order_when_accesses_are_torn() {
     for seed in 0..2_u64 {
         let draws = |index: u64| Random::new(1, Stream::Test, Purpose::Damage, 3 * seed + index, 0);
         let memory = Memory::empty();

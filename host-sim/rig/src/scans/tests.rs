@@ -52,7 +52,7 @@ fn lines_of_numbers_are_scans_and_all_other_lines_are_skipped() {
 }
 
 #[test]
-fn frames_between_marks_are_found_although_readings_look_like_marks() {
+fn frames_are_found_between_marks_when_readings_look_like_marks() {
     let (mut far, near) = line();
     let mut source = MarkedBytes::new(near, 4).unwrap();
     let frames: [[u8; 4]; 3] = [[0xAA, 0x55, 1, 2], [0xAA, 0xAA, 0x55, 0x55], [7, 8, 9, 0xAA]];
@@ -114,7 +114,7 @@ impl Source for Numbers {
 }
 
 #[test]
-fn a_listener_keeps_the_newest_scans_and_counts_those_that_are_lost() {
+fn a_listener_keeps_the_newest_scans_and_counts_lost_ones() {
     const WAIT: Duration = Duration::from_secs(20);
     let (sender, receiver) = mpsc::channel();
     let open = |_: &_| Ok((Box::new(Numbers(receiver, vec![])) as Box<dyn Source>, "opened"));

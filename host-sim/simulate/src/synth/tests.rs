@@ -8,7 +8,7 @@ use crate::rubber::StandardLinearSolid;
 use crate::sensor::Axis;
 
 #[test]
-fn a_frame_is_the_same_however_many_are_asked_for_and_whichever_rows_are_read() {
+fn a_frame_does_not_depend_on_the_number_of_frames_or_rows_read() {
     for world in [World::paper(), World::press(), world_of_contact()] {
         let whole = synthesise(&world, Stream::Training, 200);
         let few = synthesise(&world, Stream::Training, 70);
@@ -60,7 +60,7 @@ fn check_standard_normal([mean, variance]: [f64; 2], numbers: usize, of: &str) {
 }
 
 #[test]
-fn noise_of_each_kind_has_the_size_it_is_asked_for_in_frames_and_in_baselines() {
+fn noise_of_each_kind_has_its_level_in_frames_and_baselines() {
     for (kind, level) in
         [(NoiseKind::Relative, 0.02), (NoiseKind::Span, 0.02), (NoiseKind::Absolute, 0.7)]
     {
@@ -115,7 +115,7 @@ fn ratios<'t>(a: &'t Table, b: &'t Table) -> impl Iterator<Item = Vec<f64>> + 't
 }
 
 #[test]
-fn a_drifting_gain_multiplies_all_readings_of_a_session_and_its_baseline() {
+fn a_drifting_gain_multiplies_a_sessions_readings_and_baseline() {
     let (still, gain, frames) = (World::press(), 0.02, 5000);
     let drifting = World { drift: Some(Drift { gain }), ..still.clone() };
     let [drifted, undrifted] = [&drifting, &still].map(|it| synthesise(it, Stream::Test, frames));
@@ -262,7 +262,7 @@ fn a_moving_contact_is_read_row_by_row_at_its_own_times() {
 }
 
 #[test]
-fn noise_and_drift_of_a_trajectory_are_those_of_its_frames_and_its_session() {
+fn a_trajectory_has_noise_per_frame_and_drift_per_session() {
     let world = World { drift: Some(Drift { gain: 0.02 }), ..moving(30.0, 2.0) };
     let path = world.path.unwrap();
     let timetable = Timetable::every(0.001, 0.0005, 0.02).unwrap();
@@ -315,7 +315,7 @@ fn remembering(level: f64, correlated_level: f64, time_constant_ms: f64) -> Worl
 }
 
 #[test]
-fn noise_with_a_memory_has_the_size_and_the_time_constant_that_it_is_asked_for() {
+fn correlated_noise_has_its_level_and_its_time_constant() {
     for (level, correlated_level, time_constant_ms) in
         [(0.0, 0.01, 20.0), (0.005, 0.005, 20.0), (0.005, 0.005, 2.0), (0.005, 0.0, 0.0)]
     {
@@ -351,7 +351,7 @@ fn noise_with_a_memory_has_the_size_and_the_time_constant_that_it_is_asked_for()
 }
 
 #[test]
-fn noise_with_a_memory_is_more_variance_on_still_frames_and_hardly_less_in_a_baseline() {
+fn correlated_noise_hardly_averages_out_in_a_baseline() {
     let world = remembering(0.003, 0.004, 2000.0);
     let still = Synthesis::new(&world).untouched();
     let ideal = still.clone().ideal().frames(Stream::Test, 400).inputs;
@@ -388,7 +388,7 @@ const CREEPING: StandardLinearSolid =
     StandardLinearSolid { instant_share: 0.5, time_constant_ms: 50.0 };
 
 #[test]
-fn rubber_with_a_memory_is_where_the_integral_over_its_past_says_whenever_it_is_looked_at() {
+fn rubber_with_a_memory_follows_the_integral_over_its_past() {
     let elastic = moving(100.0, 5.0);
     let world = World { rubber: CREEPING.into(), ..elastic.clone() };
     world.check().unwrap();
@@ -436,7 +436,7 @@ fn rubber_with_a_memory_is_where_the_integral_over_its_past_says_whenever_it_is_
 }
 
 #[test]
-fn rubber_with_a_memory_changes_where_electrodes_are_and_not_what_pushes_them() {
+fn rubber_with_a_memory_delays_electrodes_and_not_the_contact() {
     let elastic = moving(60.0, 3.0);
     let world = World { rubber: CREEPING.into(), ..elastic.clone() };
     let path = world.path.unwrap();
@@ -475,7 +475,7 @@ fn rubber_with_a_memory_changes_where_electrodes_are_and_not_what_pushes_them() 
 }
 
 #[test]
-fn rubber_with_a_memory_is_refused_where_nobody_knows_the_answer() {
+fn rubber_with_a_memory_is_refused_for_unsupported_outputs() {
     let refused = |world: World| world.check().unwrap_err().to_string();
     let creeping = World { rubber: CREEPING.into(), ..moving(50.0, 3.0) };
     let wanted = vec![ContactOutput::Depth, ContactOutput::Force];

@@ -60,7 +60,7 @@ fn nothing_is_printed_while_nobody_views() {
 }
 
 #[test]
-fn a_new_layout_forgets_the_frame_and_the_baseline_of_the_one_before() {
+fn a_new_layout_clears_the_previous_frame_and_baseline() {
     let shared = Shared::new();
     while_printing(&shared, || {
         let _place = shared.place(1);

@@ -14,7 +14,7 @@ fn words(assembly: &str) -> Vec<u32> {
 }
 
 #[test]
-fn the_assembly_has_the_coefficients_of_its_twins_and_no_other_constants() {
+fn the_assembly_has_the_same_coefficients_as_the_rust_code() {
     let cubic = CUBIC.map(i32::cast_unsigned);
     assert_eq!(words(include_str!("../../cortex_m4/fixed16.s")), cubic);
 }

@@ -228,7 +228,7 @@ fn time_stamps_count_in_seconds_where_a_column_has_nothing_else() {
 }
 
 #[test]
-fn words_for_missing_values_and_columns_without_a_name_are_known() {
+fn words_for_missing_values_and_unnamed_columns_are_recognised() {
     let path = Path::new("test.csv");
     let file = parse(path, b",a,\n0,N/A,1\n1,na,null\n2,-,?\n", false).unwrap();
     assert_eq!(file.header, ["c1", "a", "c3"]);

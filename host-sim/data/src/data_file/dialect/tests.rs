@@ -33,7 +33,7 @@ fn lines_keep_their_numbers_whatever_stands_between_them() {
 }
 
 #[test]
-fn text_that_can_be_read_in_two_ways_is_refused_with_the_option_that_settles_it() {
+fn ambiguous_text_is_refused_with_the_option_that_resolves_it() {
     let thousands = "a;b\n1,234;5\n2,500;6\n";
     for (text, says) in [
         (thousands, "line 2: \"1,234\" may be a fraction"),

@@ -16,7 +16,7 @@ fn file(files: &[SourceFile], path: &str) -> String {
 }
 
 #[test]
-fn a_name_is_an_identifier_of_c_and_none_of_its_words_and_headers() {
+fn a_name_is_a_c_identifier_and_no_keyword_or_header() {
     for name in ["a", "mat", "my_mat2", &"x".repeat(63)] {
         assert_eq!(Name::new(name).unwrap().lower(), name);
     }
@@ -57,7 +57,7 @@ fn texts_of_a_model_end_neither_a_literal_nor_a_comment() {
 }
 
 #[test]
-fn parts_of_a_template_stay_by_their_flags_and_values_are_not_filled_again() {
+fn flags_select_parts_of_a_template_and_values_are_filled_once() {
     let mut values = Values::default();
     values.set("A", "@B@ taxel_model");
     values.set("B", "2");

@@ -34,7 +34,7 @@ impl Case {
 }
 
 #[test]
-fn groups_of_rows_give_the_weights_of_the_recursion_whatever_the_shape() {
+fn row_groups_of_any_shape_give_the_weights_of_the_recursion() {
     let shapes = [
         // Samples, centres, inputs, outputs: partial groups of rows, panels and tiles of every kind.
         (1, 1, 1, 1),

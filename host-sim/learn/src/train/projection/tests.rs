@@ -48,7 +48,7 @@ fn features_carry_all_that_outputs_take_from_readings() {
 }
 
 #[test]
-fn a_line_is_projected_as_on_the_device_and_nan_where_a_reading_is_missing() {
+fn a_line_is_projected_as_on_the_device() {
     let mut data = known(20, 0.0);
     data.inputs.values[7] = f64::NAN;
     let parameters = fit(&known(20, 0.0), None).unwrap();
@@ -138,7 +138,7 @@ fn features_are_those_of_the_lines_that_have_an_output() {
 }
 
 #[test]
-fn amounts_that_are_never_together_are_learnt_on_their_own_frames() {
+fn amounts_that_never_coincide_are_fitted_to_their_own_frames() {
     let mut data = synthesise(&World::contact(), Stream::Training, 1200);
     data.outputs = data.outputs.columns(2, 2);
     for (number, line) in data.outputs.values.chunks_exact_mut(2).enumerate() {

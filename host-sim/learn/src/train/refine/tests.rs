@@ -97,7 +97,7 @@ fn of_two_tasks(tasks: &[Vec<usize>; 2], count: usize, purpose: u64) -> [Vec<Pie
 }
 
 #[test]
-fn tasks_that_share_activations_have_the_sum_of_their_losses_and_of_its_slopes() {
+fn tasks_that_share_activations_add_their_losses_and_gradients() {
     let sizes = Sizes { inputs: 3, centres: 6, sources: 0, affine_tail: true };
     let tasks = [vec![0, 2], vec![1]];
     let (rest, held) = (of_two_tasks(&tasks, 300, 1), of_two_tasks(&tasks, 200, 2));
@@ -175,7 +175,7 @@ fn rmse(trained: &crate::train::Trained, test: &Dataset) -> f64 {
 }
 
 #[test]
-fn refined_models_are_better_and_the_same_on_any_number_of_threads() {
+fn refined_models_are_better_and_equal_on_any_number_of_threads() {
     let whole = World::press();
     let row = World { read_rows: vec![3], ..World::press() };
     // Measured: 0.959 for a row, 0.916 for the array.
@@ -219,7 +219,7 @@ impl Progress for Taken {
 
 /// Few and noisy frames, where centres would only fit the noise, leave them where they are.
 #[test]
-fn refinement_on_folds_helps_with_many_frames_and_does_no_harm_with_few() {
+fn refinement_on_folds_helps_many_frames_and_does_not_harm_few() {
     let world = World { read_rows: vec![3], ..World::press() };
     // Measured: 0.946 and 1.000.
     for (noise, frames, most) in [(0.005, 6000, 0.96), (0.02, 600, 1.001)] {

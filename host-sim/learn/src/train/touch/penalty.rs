@@ -57,7 +57,7 @@ mod tests {
     }
 
     #[test]
-    fn gaussians_are_penalised_where_they_fit_the_errors_of_single_presses() {
+    fn gaussians_that_fit_the_errors_of_presses_are_penalised() {
         assert_eq!(chosen(0.0), PENALTIES[PENALTIES.len() - 1]);
         assert!(chosen(0.3) < 1e-2);
     }

@@ -41,7 +41,7 @@ struct Run {
 }
 
 #[test]
-fn the_recursion_that_forgets_nothing_predicts_as_ridge_regression() {
+fn recursion_without_forgetting_predicts_as_ridge_regression() {
     let cases = LIVES.len() * COVARIANCES.len();
     hold("recursion", 1.0, cases as u64, |seed| {
         let life = LIVES[seed as usize % LIVES.len()];

@@ -28,7 +28,7 @@ impl Change {
 const DOUBLED: u64 = 14;
 
 #[test]
-fn columns_of_any_scale_and_offset_cost_no_accuracy_or_are_refused_by_name() {
+fn any_scale_and_offset_keeps_accuracy_or_is_refused_by_name() {
     let formats = Format::ALL;
     let base = formats.map(|format| errors([Change::NONE; 2], format).unwrap().r_squared());
     hold("scale", MOST_LOST, 200, |seed| {

@@ -74,7 +74,7 @@ fn slow_device(
 }
 
 #[test]
-fn a_restart_waits_for_a_device_that_takes_longer_to_answer_than_a_board_to_start() {
+fn a_restart_waits_for_a_device_that_is_slow_to_answer() {
     let mut device = slow_device(Duration::from_millis(150), |request| match request {
         Request::Restart => Report::Restarting,
         _ => identity(false),
@@ -113,7 +113,7 @@ fn a_model_that_is_still_on_trial_is_not_told_as_confirmed() {
 }
 
 #[test]
-fn two_frames_are_waited_for_since_the_first_may_be_the_previous_models() {
+fn an_upload_waits_for_two_frames_of_the_new_model() {
     let configuration = Configuration { frame_period_us: 1000, ..Configuration::DEFAULT };
     let asked = Rc::new(Cell::new(0));
     let counted = asked.clone();

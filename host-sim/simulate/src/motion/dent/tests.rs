@@ -135,7 +135,7 @@ fn the_force_is_the_integral_of_the_pressure_over_the_face() {
 }
 
 #[test]
-fn a_contact_goes_where_a_path_moves_it_and_keeps_its_shear_and_form() {
+fn a_contact_follows_its_path_and_keeps_its_shear_and_form() {
     let sensor = Sensor::paper();
     let motions = dents().map(Kind::from).into_iter().chain([mix([1.0, 1.0]).into()]);
     for motion in motions {
@@ -202,7 +202,7 @@ fn mix(weights: [f64; 2]) -> Mix {
 }
 
 #[test]
-fn a_mix_has_each_part_as_often_as_its_weight_says_and_just_as_alone() {
+fn a_mix_draws_each_part_by_its_weight_and_the_same_as_alone() {
     let (sensor, mix, [press, .., tail, _]) = (Sensor::paper(), mix([3.0, 1.0]), dents());
     let mut presses = 0_i32;
     let seen = |contact: &Contact| {
@@ -232,7 +232,7 @@ fn a_mix_has_each_part_as_often_as_its_weight_says_and_just_as_alone() {
 }
 
 #[test]
-fn a_mix_states_the_ranges_of_all_parts_and_refuses_what_is_no_contact() {
+fn a_mix_has_the_ranges_of_all_parts_and_refuses_other_motions() {
     let mut mixed = mix([1.0, 2.0]);
     let shallow = [[0.0, 0.9], [0.0; 2]];
     mixed.parts[0].deformation = Dent::new(Profile::Press, &[[1.0, 2.0]], shallow).into();
