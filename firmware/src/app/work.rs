@@ -29,7 +29,8 @@ pub struct Work<'m, const ROWS: usize> {
     pub outputs: usize,
     /// One over each reading of the last complete baseline; NaN without one.
     pub reciprocals: &'m mut [f32],
-    /// Whether at least one reading has a reciprocal, so that a model with relative inputs may decode.
+    /// Whether at least one reading has a reciprocal, so that a model with relative inputs may decode, and a tracker need not
+    /// take the blob's resistances at rest.
     pub has_reciprocals: bool,
     /// Room for the readings of a frame before any is filled.
     pub measured: &'m mut [f32],
@@ -89,18 +90,17 @@ impl<const ROWS: usize> Work<'_, ROWS> {
                 self.contact.restart();
                 self.events = Events::default();
             }
-            let relative_inputs = decoder.metadata().relative_inputs;
-            let has_baseline = !relative_inputs || self.has_reciprocals;
-            if !has_baseline {
+            let lacks_baseline = decoder.metadata().relative_inputs && !self.has_reciprocals;
+            if lacks_baseline {
                 flags |= EstimateReport::NO_BASELINE;
             }
             let Configuration { track, filter_lead_us, .. } = sensor.configuration;
             let mut row_us = [0.0; ROWS];
-            let tracked = scan.zip(model.tracker).filter(|_| track && has_baseline);
+            let tracked = scan.zip(model.tracker).filter(|_| track && !lacks_baseline);
             let tracked = tracked.map(|(scan, tracker)| {
                 let frame = track::Frame {
                     readings_ohm: self.measured,
-                    reciprocals: relative_inputs.then_some(&*self.reciprocals),
+                    reciprocals: self.has_reciprocals.then_some(&*self.reciprocals),
                     start_us: scan.start_us,
                     row_us: row_times(scan, &sensor.wiring, tracker, &mut row_us),
                 };

@@ -16,7 +16,7 @@ fn leading() -> Configuration {
 struct Own<'b> {
     decoder: Decoder<'b, ROWS>,
     state: State,
-    /// One over each reading of the baseline, for a model with relative inputs.
+    /// One over each reading of the baseline.
     reciprocals: Option<[f32; ROWS * COLS]>,
     /// Frames that needed no network, and that the network's estimate is left of.
     followed: u32,
@@ -76,15 +76,19 @@ fn touch(frame: u32) -> TestFrame {
 
 #[test]
 fn frames_are_tracked_as_in_model_core_without_filled_readings() {
-    for is_relative in [false, true] {
-        let (blob, rest) = (blob_with_tracker(is_relative), frame_at_rest());
+    for (is_relative, gain) in [(false, None), (false, Some(1.02)), (true, Some(1.0))] {
+        // A baseline tells gains from contacts, for a model that takes readings as they are, too.
+        let rest = frame_at_rest().map(|row| row.map(|ohm| gain.unwrap_or(1.0) * ohm));
+        let (blob, baseline) = (blob_with_tracker(is_relative), gain.map(|_| &rest));
         let mut host = started(leading(), &blob);
         if is_relative {
             let (flags, ..) = host.decode(&rest);
             assert_eq!(flags & EstimateReport::NO_BASELINE, EstimateReport::NO_BASELINE);
-            host.set_baseline(rest.as_flattened());
         }
-        let mut own = Own::new(&blob, is_relative.then_some(&rest));
+        if let Some(baseline) = baseline {
+            host.set_baseline(baseline.as_flattened());
+        }
+        let mut own = Own::new(&blob, baseline);
         for frame in 0..40 {
             let start_us = 2000 * u64::from(frame);
             let decoded = own.decoded;
@@ -100,7 +104,7 @@ fn frames_are_tracked_as_in_model_core_without_filled_readings() {
         assert!(own.followed > 20 && own.decoded > 2, "{} {}", own.followed, own.decoded);
         // Another configuration starts the tracker anew, or turns it off.
         host.tell(&Request::Configure(Configuration { report_every: 2, ..leading() }));
-        let first = Own::new(&blob, is_relative.then_some(&rest)).track(0, [0.0; 2], &touch(5));
+        let first = Own::new(&blob, baseline).track(0, [0.0; 2], &touch(5));
         assert_eq!(host.decode(&touch(5)).2, first);
         host.tell(&Request::Configure(Configuration { track: false, ..leading() }));
         let raw = host.decode(&touch(5)).2;

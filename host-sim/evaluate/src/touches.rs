@@ -136,8 +136,7 @@ impl<'s> Touches<'s> {
         let times = device.times(scan_ms, &cost);
         let of_period = self.at(&times)?;
         let ahead_ms = times.frame_ms + 0.5 * of_period.period_ms;
-        let relative = parsed.metadata().relative_inputs;
-        let decoder = Tracked::new(model.clone(), tracker, relative, (1000.0 * ahead_ms) as f32);
+        let decoder = Tracked::new(model.clone(), tracker, None, (1000.0 * ahead_ms) as f32);
         let estimates = of_period.moving.decoded(&decoder);
         let (errors, blocks) = of_period.moving.errors(&estimates, times.frame_ms, measure);
         let filter = Settings::default();

@@ -183,8 +183,9 @@ fn smooth(sensor: &Sensor, path: Option<&Path>, deepest: f64) -> ([[f64; 3]; 2],
 
 #[cfg(test)]
 mod tests {
+    use taxel_core::filter::Settings as Filter;
     use taxel_data::{Silent, Table};
-    use taxel_learn::tracked::{Series, track_table};
+    use taxel_learn::tracked::{Series, decode_series};
     use taxel_simulate::Synthesis;
 
     use super::*;
@@ -245,9 +246,8 @@ mod tests {
             let mut values = readings.values[..40 * width].to_vec();
             (20..40).for_each(|frame| values[frame * width + 70] *= with);
             let readings = Table { names: readings.names.clone(), values: values.into() };
-            let (frames, tracker) =
-                (Series { start_us: &start_us, faulty }, model.model().tracker().unwrap());
-            track_table(&model, tracker, &readings, frames, 0.0).values.to_vec()
+            let series = Series { start_us: &start_us, faulty, baseline: None };
+            decode_series(&model, &readings, series, Filter::default()).values.to_vec()
         };
         let missing = track(f64::NAN, &[]);
         assert!(missing.iter().all(|value| value.is_finite()));

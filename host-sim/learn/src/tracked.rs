@@ -1,31 +1,43 @@
 //! Decoders that track a contact, bit for bit as a device does, and the shares that a tracker needs of a sensor.
 
 use nalgebra::{DMatrix, DVector};
+use taxel_core::filter::{self, Settings};
 use taxel_core::track::{Frame, State, TERMS, Tracker};
 use taxel_core::{Estimate, RowStatus};
 use taxel_data::Table;
 
 use crate::decoder::{Estimates, FrameDecoder, Frames, Timing};
+use crate::filtered::filter_frames;
 use crate::prepared::PreparedModel;
+use crate::relative::reciprocals;
 
-/// Decoder whose estimates a tracker corrects, wherever it explains the readings. Outputs are rounded to f32. Frames whose
+/// Model whose estimates its tracker corrects, wherever it explains the readings. Outputs are rounded to f32. Frames whose
 /// times are not known stay as they are decoded. Deviations and novelty stay those of each frame.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Tracked<'b, D> {
-    decoder: D,
+#[derive(Debug, Clone)]
+pub struct Tracked<'b> {
+    model: PreparedModel<'b>,
     tracker: Tracker<'b>,
-    /// Whether readings are relative to the baseline.
-    relative_inputs: bool,
+    /// One over the baseline of each reading; 1 of those that are relative to it already.
+    reciprocals: Option<Vec<f32>>,
     /// Time in µs from the start of a frame for which outputs are expected.
     ahead_us: f32,
     name: String,
 }
 
-impl<'b, D: FrameDecoder> Tracked<'b, D> {
-    /// A `tracker` behind `decoder`, whose outputs are those expected `ahead_us` after the start of each frame.
-    pub fn new(decoder: D, tracker: Tracker<'b>, relative_inputs: bool, ahead_us: f32) -> Self {
-        let name = format!("{}, tracked", decoder.name());
-        Self { decoder, tracker, relative_inputs, ahead_us, name }
+impl<'b> Tracked<'b> {
+    /// The `tracker` of a `model` behind it, whose outputs are those expected `ahead_us` after the start of each frame. A model
+    /// that takes readings as they are may have a `baseline` for its tracker, as on a device: one in their units for each.
+    pub fn new(
+        model: PreparedModel<'b>,
+        tracker: Tracker<'b>,
+        baseline: Option<&[f64]>,
+        ahead_us: f32,
+    ) -> Self {
+        let name = format!("{}, tracked", model.name());
+        let ratios = model.model().metadata().relative_inputs;
+        let ones = ratios.then(|| vec![1.0; model.inputs()]);
+        let reciprocals = ones.or_else(|| baseline.map(reciprocals));
+        Self { model, tracker, reciprocals, ahead_us, name }
     }
 
     /// Writes over the `values` that a decoder has made of `frames`, wherever the tracker explains them.
@@ -38,8 +50,6 @@ impl<'b, D: FrameDecoder> Tracked<'b, D> {
         let row_us: Vec<f32> = (0..sizes.rows)
             .map(|row| reading_offset_us.get(row * sizes.columns).map_or(0.0, |us| *us as f32))
             .collect();
-        let ones = vec![1.0; sizes.cells()];
-        let reciprocals = self.relative_inputs.then_some(&ones[..]);
         let outputs = values.len().checked_div(start_us.len()).unwrap_or(0).max(1);
         let lines = values.chunks_exact_mut(outputs);
         let readings = frames.readings.chunks_exact(sizes.cells().max(1));
@@ -50,7 +60,7 @@ impl<'b, D: FrameDecoder> Tracked<'b, D> {
             let mut estimate = Estimate { outputs: &mut outputs, status: &mut status };
             let frame = Frame {
                 readings_ohm: &readings,
-                reciprocals,
+                reciprocals: self.reciprocals.as_deref(),
                 start_us: *start_us,
                 row_us: &row_us,
             };
@@ -61,19 +71,19 @@ impl<'b, D: FrameDecoder> Tracked<'b, D> {
     }
 }
 
-impl<D: FrameDecoder> FrameDecoder for Tracked<'_, D> {
-    type State = (D::State, State);
+impl FrameDecoder for Tracked<'_> {
+    type State = State;
 
     fn name(&self) -> &str {
         &self.name
     }
 
     fn inputs(&self) -> usize {
-        self.decoder.inputs()
+        self.model.inputs()
     }
 
-    fn decode(&self, (decoder, state): &mut Self::State, frames: Frames<'_>) -> Estimates {
-        let mut estimates = self.decoder.decode(decoder, frames);
+    fn decode(&self, state: &mut Self::State, frames: Frames<'_>) -> Estimates {
+        let mut estimates = self.model.decode(&mut (), frames);
         self.track(state, frames, &mut estimates.values);
         estimates
     }
@@ -86,25 +96,30 @@ pub struct Series<'a> {
     pub start_us: &'a [u64],
     /// Places of readings among those of all frames that were not measured: they are missing, or filled.
     pub faulty: &'a [usize],
+    /// Baseline of each reading, for the tracker of a model that takes readings as they are.
+    pub baseline: Option<&'a [f64]>,
 }
 
-/// Outputs of the `model` behind its `tracker`, for one trajectory of `readings` in their units. Outputs are those expected
-/// `ahead_us` after each frame.
-pub fn track_table(
+/// Outputs of the `model` for one trajectory of `readings` in their units, as of a device: through a `filter` that is on, else
+/// behind the model's tracker, if it has one. They are those expected the lead after each frame.
+pub fn decode_series(
     model: &PreparedModel<'_>,
-    tracker: Tracker<'_>,
     readings: &Table,
-    Series { start_us, faulty }: Series<'_>,
-    ahead_us: f32,
+    Series { start_us, faulty, baseline }: Series<'_>,
+    filter: Settings,
 ) -> Table {
-    let relative_inputs = model.model().metadata().relative_inputs;
-    let tracked = Tracked::new(model.clone(), tracker, relative_inputs, ahead_us);
-    let mut measured = model.model_inputs(&readings.values).into_owned();
-    faulty.iter().for_each(|place| measured[*place] = f64::NAN);
-    let timing = Some(Timing { start_us, reading_offset_us: &[] });
     let mut estimates = model.decode_table(readings);
-    let measured = Frames { readings: &measured, timing };
-    tracked.track(&mut State::default(), measured, &mut estimates.values);
+    if filter.is_on() {
+        let mut state = filter::State::new(vec![[0.0; 2]; estimates.names.len()]);
+        filter_frames(&mut state, filter, start_us, &mut estimates.values);
+    } else if let Some(tracker) = model.model().tracker() {
+        let tracked = Tracked::new(model.clone(), tracker, baseline, filter.lead_us as f32);
+        let mut measured = model.model_inputs(&readings.values).into_owned();
+        faulty.iter().for_each(|place| measured[*place] = f64::NAN);
+        let timing = Some(Timing { start_us, reading_offset_us: &[] });
+        let measured = Frames { readings: &measured, timing };
+        tracked.track(&mut State::default(), measured, &mut estimates.values);
+    }
     estimates
 }
 

@@ -6,7 +6,7 @@ use crate::experiment::names_a_scene;
 use crate::report::Sections;
 use crate::{Error, Result};
 use clap::Args;
-use taxel_core::blob::Metadata;
+use taxel_core::blob::Model;
 use taxel_data::{DataFile, Rest, Stream};
 use taxel_learn::ModelBlob;
 use taxel_rig::device::check::{Findings, Frames, Plan};
@@ -78,7 +78,7 @@ impl CheckArguments {
         let parsed = model.parse();
         let metadata = parsed.metadata();
         let rest = self.untouched.rest_if_relative(&file, metadata, None, common)?;
-        let baseline_ohm = self.baseline_ohm(metadata, path, rest.as_ref(), common)?;
+        let baseline_ohm = self.baseline_ohm(&parsed, path, rest.as_ref(), common)?;
         let count = self.count.frames.max(1);
         let start_us = if self.filter.settings().is_on() {
             cycled(&self.period.of_file(&file)?, count)
@@ -89,16 +89,19 @@ impl CheckArguments {
         Ok(Checked { frames, model })
     }
 
-    /// Baseline of which all readings are believed: the device is given the same one for all frames. It is that of the
-    /// first lines at `rest`, unless a file was given for it.
+    /// Baseline of which all readings are believed, or those of a tracker: the device is given the same one for all frames. It
+    /// is that of the first lines at `rest`, unless a file was given for it.
     fn baseline_ohm(
         &self,
-        metadata: &Metadata<'_>,
+        model: &Model<'_>,
         path: &Path,
         rest: Option<&Rest>,
         common: &Common,
     ) -> Result<Option<Vec<f64>>> {
-        let fields = FieldArguments::default();
+        let (fields, metadata) = (FieldArguments::default(), model.metadata());
+        if model.tracker().is_some() && !metadata.relative_inputs {
+            return self.untouched.baseline.read(metadata, (&fields, None), common);
+        }
         let baseline =
             self.untouched.baselines(metadata, path, (rest, 1), &fields, None, common)?;
         Ok(baseline.map(|baseline| baseline.values.into_vec()))
@@ -130,12 +133,13 @@ impl CheckArguments {
             )));
         }
         let path = self.of.model.as_deref().unwrap_or(self.scene.path());
-        let baseline_ohm = if metadata.relative_inputs && self.untouched.path().is_none() {
+        let takes_baseline = metadata.relative_inputs || parsed.tracker().is_some();
+        let baseline_ohm = if takes_baseline && self.untouched.path().is_none() {
             // All frames are of one session, which does not drift.
             let session = Synthesis::new(&scene.world).drift(None);
             Some(session.baselines(Stream::Test, 1, BASELINE_FRAMES).values.into_vec())
         } else {
-            self.baseline_ohm(metadata, path, None, common)?
+            self.baseline_ohm(&parsed, path, None, common)?
         };
         let readings = synthesise(&scene.world, Stream::Test, self.count.frames.max(1)).inputs;
         let start_us = self.period.even(readings.len(), PERIOD_US);

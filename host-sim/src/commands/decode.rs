@@ -7,15 +7,13 @@ use crate::live::sheet;
 use crate::report::Sections;
 use crate::{Error, Result};
 use clap::Args;
-use taxel_core::filter::State;
 use taxel_data::Clock;
 use taxel_data::csv_file::{self, Column};
 use taxel_data::data_file::{DataFile, FieldTexts};
 use taxel_data::table::Table;
 use taxel_firmware::link::message::EstimateReport;
-use taxel_learn::filtered::filter_frames;
 use taxel_learn::infer::is_missing;
-use taxel_learn::tracked::{Series, track_table};
+use taxel_learn::tracked::{Series, decode_series};
 use taxel_learn::{ModelBlob, PreparedModel};
 use taxel_recording::{Extras, Frame};
 
@@ -72,10 +70,11 @@ pub struct Arguments {
 }
 
 pub fn execute(arguments: &Arguments, common: &Common) -> Result<print::Outcome> {
+    let output = &*arguments.to.output;
     let baseline = arguments.untouched.path().unwrap_or(&arguments.readings);
     let read = [&*arguments.model, &arguments.readings, baseline];
-    print::check_output(&arguments.to.output, &read)?;
-    if is_recording(&arguments.to.output) && !arguments.keep.is_empty() {
+    print::check_output(output, &read)?;
+    if is_recording(output) && !arguments.keep.is_empty() {
         let message =
             "--keep: a recording has columns of its own; write a CSV file, or leave the option out";
         return Err(Error::Usage(message.into()));
@@ -92,62 +91,54 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<print::Outcome>
     let metadata = parsed.metadata();
     let rest = arguments.untouched.rest_if_relative(&file, metadata, limits, common)?;
     let log = (rest.as_ref(), file.lines());
-    let baselines =
-        arguments.untouched.baselines(metadata, &arguments.model, log, fields, limits, common)?;
+    let settings = arguments.filter.settings();
+    let is_tracked = parsed.tracker().is_some() && !settings.is_on();
+    let (baselines, baseline) = if is_tracked && !metadata.relative_inputs {
+        (None, arguments.untouched.baseline.read(metadata, (fields, limits), common)?)
+    } else {
+        let model = &arguments.model;
+        (arguments.untouched.baselines(metadata, model, log, fields, limits, common)?, None)
+    };
     let mut readings = model_inputs(&model, &file)?;
-    let scanned = is_recording(&arguments.to.output)
+    let scanned = is_recording(output)
         .then(|| Ok::<_, Error>((clock_us(&file)?, readings.values.clone())))
         .transpose()?;
     let mut health = arguments.health.apply(&model, &mut readings, baselines.as_ref(), common)?;
     let (model, readings) =
         related(model, readings, baselines.as_ref(), &mut health.is_faulty, common);
     remark_on_range(&model, &readings, common);
-    let settings = arguments.filter.settings();
-    let tracker = parsed.tracker().filter(|_| !settings.is_on());
     let has_times = arguments.filter.lead_ms.is_some() || arguments.period.period_ms.is_some();
-    if has_times && tracker.is_none() && !settings.is_on() {
+    let is_series = is_tracked || settings.is_on();
+    if has_times && !is_series {
         let rule = "--lead-ms and --period-ms are of a filter or a tracker, and MODEL has no tracker: give --filter-ms as well";
         return Err(Error::Usage(rule.into()));
     }
-    let mut estimate = match tracker.map(|tracker| (tracker, arguments.period.of_file(&file))) {
-        Some((tracker, Ok(start_us))) => {
-            let frames = Series { start_us: &start_us, faulty: &health.faulty };
-            track_table(&model, tracker, &readings, frames, settings.lead_us as f32)
+    let estimate = match is_series.then(|| arguments.period.of_file(&file)) {
+        Some(Ok(start_us)) => {
+            let (start_us, baseline) = (&start_us[..], baseline.as_deref());
+            let series = Series { start_us, faulty: &health.faulty, baseline };
+            decode_series(&model, &readings, series, settings)
         }
-        Some((_, Err(cause))) => {
+        Some(Err(cause)) if !is_tracked => return Err(cause),
+        Some(Err(cause)) => {
             common.remark(format_args!("note: no contact is tracked: {cause}"));
             model.decode_table(&readings)
         }
         None => model.decode_table(&readings),
     };
-    if settings.is_on() {
-        let start_us = arguments.period.of_file(&file)?;
-        let mut state = State::new(vec![[0.0; 2]; estimate.names.len()]);
-        filter_frames(&mut state, settings, &start_us, &mut estimate.values);
-    }
     let keep = kept(arguments, &file, &estimate)?;
-    let assessed = arguments.confidence.then(|| model.assess(&readings.values));
-    let assessed = match assessed {
-        Some(None) => {
-            let message = "it tells no confidence: train it with --reading-model full".into();
-            return Err(Error::Unfit { path: arguments.model.clone(), message });
-        }
-        Some(assessed) => assessed,
-        None => None,
-    };
+    let assessed = arguments.confidence.then(|| model.assess(&readings.values)).flatten();
+    if arguments.confidence && assessed.is_none() {
+        let message = "it tells no confidence: train it with --reading-model full".into();
+        return Err(Error::Unfit { path: arguments.model.clone(), message });
+    }
     let novelty = assessed.as_ref().map(|(_, novelty)| &novelty[..]);
     let flags = flags(&model, &readings, &estimate, &health, novelty);
     match scanned {
         Some((start_us, scanned)) => {
-            record(
-                &arguments.to.output,
-                &blob,
-                (&start_us, &scanned),
-                &estimate,
-                assessed.as_ref(),
-            )?;
+            record(output, &blob, (&start_us, &scanned), &estimate, assessed.as_ref())?;
         }
-        None => write(&arguments.to.output, &keep, &estimate, assessed.as_ref(), &flags)?,
+        None => write(output, &keep, &estimate, assessed.as_ref(), &flags)?,
     }
     let inputs = model.model_inputs(&readings.values);
     let frames = inputs.chunks_exact(readings.names.len());
@@ -166,7 +157,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<print::Outcome>
     result.value("health", &health);
     let novel = assessed.map(|(_, frames)| novel(&frames));
     result.fact("frames_novel", "novel frames, unlike those of training", "", novel);
-    result.fact("file", "file", "", arguments.to.output.display().to_string());
+    result.fact("file", "file", "", output.display().to_string());
     Ok(print::sections(common, &result))
 }
 

@@ -20,7 +20,7 @@ use super::data_file::FieldArguments;
 #[derive(Clone, Args, Default, Serialize, Deserialize)]
 pub struct BaselineArgument {
     /// CSV file with frames of the untouched sensor, in columns of the same names as the readings. The mean of its lines is the
-    /// baseline of relative inputs, instead of lines at rest.
+    /// baseline of relative inputs, instead of lines at rest, or of a tracker.
     #[arg(long, value_name = "FILE")]
     pub baseline: Option<PathBuf>,
 }
@@ -53,7 +53,6 @@ impl BaselineArgument {
         let unfit =
             |message: &str| Err(Error::Unfit { path: path.into(), message: message.into() });
         match (&self.baseline, metadata.relative_inputs) {
-            (None, false) => Ok(None),
             (None, true) => unfit(&format!(
                 "its inputs are readings relative to the baseline: give --baseline FILE, with frames of the \
                  untouched sensor{or}"
@@ -61,23 +60,32 @@ impl BaselineArgument {
             (Some(_), false) => unfit(
                 "its inputs are readings as they are: leave --baseline out, or train with --relative-inputs",
             ),
-            (Some(file), true) => {
-                let names = metadata.input_names.iter();
-                let untouched = fields.read(file, common)?;
-                warn_of_touches(&untouched, metadata, common);
-                let baseline = baseline(&untouched, names, limits, common)?;
-                let missing = unusable(&baseline);
-                if !missing.is_empty() {
-                    common.remark(format_args!(
-                        "note: {} has no baseline for {}: a mean that is missing, zero or negative, or no reading within the \
-                         limits; these readings count as missing",
-                        file.display(),
-                        columns::some_names(&missing)
-                    ));
-                }
-                Ok(Some(baseline.values.into_vec()))
-            }
+            (Some(_), true) | (None, false) => self.read(metadata, (fields, limits), common),
         }
+    }
+
+    /// Baseline in the readings' units, if a file was given for it.
+    pub fn read(
+        &self,
+        metadata: &Metadata<'_>,
+        (fields, limits): (&FieldArguments, Option<Limits>),
+        common: &Common,
+    ) -> Result<Option<Vec<f64>>> {
+        let Some(file) = &self.baseline else { return Ok(None) };
+        let names = metadata.input_names.iter();
+        let untouched = fields.read(file, common)?;
+        warn_of_touches(&untouched, metadata, common);
+        let baseline = baseline(&untouched, names, limits, common)?;
+        let missing = unusable(&baseline);
+        if !missing.is_empty() {
+            common.remark(format_args!(
+                "note: {} has no baseline for {}: a mean that is missing, zero or negative, or no reading within the limits; \
+                 these readings count as missing",
+                file.display(),
+                columns::some_names(&missing)
+            ));
+        }
+        Ok(Some(baseline.values.into_vec()))
     }
 }
 

@@ -131,7 +131,7 @@ impl RestArgument {
 #[derive(Args)]
 pub struct UntouchedArguments {
     #[command(flatten)]
-    baseline: BaselineArgument,
+    pub baseline: BaselineArgument,
     #[command(flatten)]
     pub rest: RestArgument,
 }

@@ -20,7 +20,8 @@ pub struct FrameByFrame<'b> {
     tracker: Option<(Tracker<'b>, State)>,
     /// Limits of readings that are believed, where columns are in Ω.
     limits: Option<Limits>,
-    reciprocals: Vec<f32>,
+    /// One over each reading of the baseline; `None` of a model that takes readings as they are, until there is one.
+    reciprocals: Option<Vec<f32>>,
     scratch: Vec<f32>,
 }
 
@@ -35,7 +36,7 @@ impl<'b> FrameByFrame<'b> {
         let metadata = decoder.metadata();
         let limits = sheet::limits(metadata.input_names.iter());
         let readings = metadata.input_names.iter().count();
-        let reciprocals = if metadata.relative_inputs { vec![f32::NAN; readings] } else { vec![] };
+        let reciprocals = metadata.relative_inputs.then(|| vec![f32::NAN; readings]);
         let scratch = vec![0.0; decoder.scratch_floats()];
         let tracker = blob.parse().tracker().map(|tracker| (tracker, State::new()));
         Ok(Self { decoder, tracker, limits, reciprocals, scratch })
@@ -43,16 +44,15 @@ impl<'b> FrameByFrame<'b> {
 
     /// What is to be said while the model divides readings by a baseline, and has none yet.
     pub fn note(&self) -> Option<String> {
-        let lacks = !self.reciprocals.is_empty() && self.reciprocals.iter().all(|it| it.is_nan());
+        let lacks = self.reciprocals.as_ref().is_some_and(|all| all.iter().all(|it| it.is_nan()));
         let words =
             "nothing is decoded yet: the model divides by the untouched sensor; zero it (b)";
         lacks.then(|| words.into())
     }
 
-    /// Takes the readings of the untouched sensor, if the model divides by them.
+    /// Takes the readings of the untouched sensor, for a model that divides by them, or a tracker.
     pub fn set_baseline(&mut self, readings: &[f32]) {
-        let reciprocals = self.reciprocals.iter_mut().zip(readings);
-        reciprocals.for_each(|(its, reading)| *its = reciprocal(*reading));
+        self.reciprocals = Some(readings.iter().map(|reading| reciprocal(*reading)).collect());
         if let Some((_, state)) = &mut self.tracker {
             state.restart();
         }
@@ -81,8 +81,9 @@ impl<'b> FrameByFrame<'b> {
             (*reading, any_faulty) = (f32::NAN, true);
         }
         let measured = readings.clone();
-        self.decoder.fill(&mut readings, &self.reciprocals, &mut self.scratch);
-        let frame = Frame { readings_ohm: &readings, reciprocals: &self.reciprocals };
+        let reciprocals = self.reciprocals.as_deref();
+        self.decoder.fill(&mut readings, reciprocals.unwrap_or_default(), &mut self.scratch);
+        let frame = Frame { readings_ohm: &readings, reciprocals: reciprocals.unwrap_or_default() };
         let mut outputs = vec![f32::NAN; shape.rows * shape.outputs];
         let mut status = vec![RowStatus::MissingReading; shape.rows];
         let mut estimate = Estimate { outputs: &mut outputs, status: &mut status };
@@ -93,7 +94,7 @@ impl<'b> FrameByFrame<'b> {
         if let Some((tracker, state)) = &mut self.tracker {
             let frame = track::Frame {
                 readings_ohm: &measured,
-                reciprocals: Some(&self.reciprocals[..]).filter(|all| !all.is_empty()),
+                reciprocals,
                 start_us: moment.frame.time_us,
                 row_us: &vec![0.0; shape.rows],
             };
@@ -119,8 +120,9 @@ impl<'b> FrameByFrame<'b> {
 
 #[cfg(test)]
 mod tests {
+    use taxel_core::filter::Settings;
     use taxel_data::{Silent, Stream};
-    use taxel_learn::tracked::{Series, track_table};
+    use taxel_learn::tracked::{Series, decode_series};
     use taxel_recording::Frame;
     use taxel_simulate::Synthesis;
 
@@ -176,19 +178,26 @@ mod tests {
         let blob = scene.train(&Silent).unwrap();
         let rest = Synthesis::new(&scene.world).untouched().frames(Stream::Test, 20).inputs;
         let start_us: Vec<u64> = (0..20).map(|frame| 10_000 * frame).collect();
-        let series = Series { start_us: &start_us, faulty: &[] };
-        let (model, parsed) = (blob.prepare(), blob.parse());
-        let expected = track_table(&model, parsed.tracker().unwrap(), &rest, series, 0.0);
+        let model = blob.prepare();
         let mut decoder = FrameByFrame::new(&blob).unwrap();
-        for (line, time_us) in start_us.into_iter().enumerate() {
-            let readings = rest.line(line).iter().map(|it| *it as f32).collect();
-            let mut moment = Moment::new(Frame { readings, time_us, ..Frame::default() });
-            decoder.decode(&mut moment).unwrap();
-            let outputs = moment.frame.outputs.unwrap();
-            assert!(
-                outputs.iter().map(|it| f64::from(*it)).eq(expected.line(line).iter().copied())
-            );
+        let mut decoded = vec![model.decode_table(&rest).values];
+        // Without a baseline, and then with one, which is of the same readings.
+        for baseline in [None, Some(rest.line(0))] {
+            if let Some(baseline) = baseline {
+                decoder.set_baseline(&baseline.iter().map(|it| *it as f32).collect::<Vec<_>>());
+            }
+            let series = Series { start_us: &start_us, faulty: &[], baseline };
+            let expected = decode_series(&model, &rest, series, Settings::default());
+            for (line, time_us) in start_us.iter().copied().enumerate() {
+                let readings = rest.line(line).iter().map(|it| *it as f32).collect();
+                let mut moment = Moment::new(Frame { readings, time_us, ..Frame::default() });
+                decoder.decode(&mut moment).unwrap();
+                let outputs = moment.frame.outputs.unwrap();
+                let outputs = outputs.iter().map(|it| f64::from(*it));
+                assert!(outputs.eq(expected.line(line).iter().copied()));
+            }
+            assert!(!decoded.contains(&expected.values));
+            decoded.push(expected.values);
         }
-        assert_ne!(expected.values, model.decode_table(&rest).values);
     }
 }

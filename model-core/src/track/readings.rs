@@ -75,7 +75,8 @@ impl Sizes {
 pub struct Frame<'f> {
     /// All cells in Ω, row after row; one that is NaN does not count.
     pub readings_ohm: &'f [f32],
-    /// One over each reading of the baseline, in place of the resistances at rest that the blob has.
+    /// One over each reading of the baseline, in place of the resistances at rest that the blob has: then gains that differ
+    /// from those of training do not matter.
     pub reciprocals: Option<&'f [f32]>,
     /// Start of the frame in µs, by a clock of any start.
     pub start_us: u64,

@@ -62,22 +62,29 @@ pub fn log() -> PathBuf {
 
 /// Trains the models for the checks, and returns the checks.
 pub fn checks() -> Outcome<[Check; 5]> {
-    let [rows, array, tracked, moving] =
-        ["qemu-rows.bin", "qemu-array.bin", "qemu-tracked.bin", "qemu-moving.csv"]
-            .map(|name| target_dir().join(name).into_os_string());
+    let files = ["rows.bin", "array.bin", "tracked.bin", "moving.csv", "rest.csv"];
+    let [rows, array, tracked, moving, rest] =
+        files.map(|name| target_dir().join(format!("qemu-{name}")).into_os_string());
     let log = log().into_os_string();
     // Removes the log of the previous run, if there was one.
     let _ = fs::remove_file(&log);
     make(&["train", "press", "--no-refine"], ROWS, &rows)?;
     make(&["train", "press", "--no-refine"], &[], &array)?;
     make(&["train", "moving", "--no-refine"], &["--track"], &tracked)?;
-    make(&["synth", "moving"], TRACKED, &moving)?;
+    // A gain that a tracker knows by the baseline alone.
+    make(&["synth", "moving", "--scale=1.02"], TRACKED, &moving)?;
+    make(&["synth", "moving", "--scale=1.02", "--untouched"], TRACKED, &rest)?;
     let (press, model) = (OsStr::new("press"), OsStr::new("--model"));
     Ok([
         Check::new("application", press, OF_ROWS, &[model, &rows, "--log".as_ref(), &log]),
         Check::new("application with one network", press, OF_ARRAY, &[model, &array]),
         Check::new("application with a filter", press, FILTERED, &[model, &array]),
-        Check::new("application with a tracker", &moving, TRACKED, &[model, &tracked]),
+        Check::new(
+            "application with a tracker",
+            &moving,
+            TRACKED,
+            &[model, &tracked, "--baseline".as_ref(), &rest],
+        ),
         Check {
             name: "application by tests",
             arguments: BY_TESTS.iter().map(OsString::from).collect(),

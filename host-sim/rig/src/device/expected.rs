@@ -2,11 +2,10 @@
 
 use std::time::Duration;
 
-use taxel_core::filter::{Settings, State};
+use taxel_core::filter::Settings;
 use taxel_data::{Progress, Table};
 use taxel_firmware::link::message::{Configuration, EstimateReport};
-use taxel_learn::filtered::filter_frames;
-use taxel_learn::tracked::{Series, track_table};
+use taxel_learn::tracked::{Series, decode_series};
 use taxel_learn::{ModelBlob, PreparedModel};
 
 use super::{Device, stream, upload};
@@ -17,7 +16,7 @@ use crate::error::{Result, check_room};
 pub struct Frames {
     /// Readings in Ω, in the columns of the model's inputs.
     pub readings: Table,
-    /// Baseline in Ω of each of these columns, for a model with relative inputs.
+    /// Baseline in Ω of each of these columns, for a model with relative inputs or a tracker.
     pub baseline_ohm: Option<Vec<f64>>,
     /// Start of each frame in µs, for a filter.
     pub start_us: Vec<u64>,
@@ -30,7 +29,7 @@ pub(super) struct Expected {
     per_frame: [usize; 2],
     /// Novelty and deviations of every frame; none of a model that tells neither.
     confidence: Vec<(f32, Vec<f32>)>,
-    /// Baseline that the device needs, in Ω.
+    /// Baseline that the device needs, in Ω; NaN if it is to have none.
     baseline_ohm: Option<Vec<f32>>,
     /// Start of each frame in µs.
     start_us: Vec<u64>,
@@ -41,7 +40,7 @@ pub(super) struct Expected {
 
 impl Expected {
     /// Answers of the model of `blob` to `frames`, through this filter, else behind its tracker, and with their baseline
-    /// if its inputs are relative.
+    /// if its inputs are relative or it tracks.
     pub(super) fn new(
         blob: &ModelBlob,
         Frames { readings, baseline_ohm, start_us }: &Frames,
@@ -53,21 +52,15 @@ impl Expected {
             Some(baseline) => model.with_baseline(baseline),
             None => model,
         };
-        let lead_us = filter.lead_us as f32;
-        let tracker = model.model().tracker().filter(|_| !filter.is_on());
-        let mut outputs = match tracker {
-            Some(tracker) => {
-                let frames = Series { start_us: &start_us, faulty: &[] };
-                track_table(&model, tracker, readings, frames, lead_us)
-            }
-            None => model.decode_table(readings),
-        };
-        let mut state = State::new(vec![[0.0; 2]; outputs.names.len()]);
-        filter_frames(&mut state, filter, &start_us, &mut outputs.values);
+        let is_tracked = model.model().tracker().is_some() && !filter.is_on();
+        let series = Series { start_us: &start_us, faulty: &[], baseline: baseline_ohm };
+        let outputs = decode_series(&model, readings, series, filter);
         let f32s =
             |values: &[f64]| -> Vec<f32> { values.iter().map(|value| *value as f32).collect() };
-        let (baseline_ohm, readings_ohm) = (baseline_ohm.map(f32s), f32s(&readings.values));
         let per_frame = [readings.names.len(), outputs.names.len()];
+        let none = is_tracked.then(|| vec![f32::NAN; per_frame[0]]); // for the one that a device may have
+        let (baseline_ohm, readings_ohm) =
+            (baseline_ohm.map(f32s).or(none), f32s(&readings.values));
         let confidence = confidence(&model, readings);
         let outputs = f32s(&outputs.values);
         Self {
@@ -78,13 +71,8 @@ impl Expected {
             baseline_ohm,
             start_us,
             filter,
-            is_tracked: tracker.is_some(),
+            is_tracked,
         }
-    }
-
-    /// Gives the device the baseline that it needs, if any.
-    pub(super) fn set_baseline(&self, device: &mut Device) -> Result<()> {
-        self.baseline_ohm.as_deref().map_or(Ok(()), |baseline| device.set_baseline(baseline))
     }
 
     /// Configuration of a device that filters, and takes readings beyond its limits, if there are any: other sensors read
@@ -134,7 +122,7 @@ impl Expected {
         let mut same = 0;
         device.pause()?; // what is configured next is another configuration, and starts the filter anew
         device.configure(self.configuration())?;
-        self.set_baseline(device)?;
+        self.baseline_ohm.as_deref().map_or(Ok(()), |baseline| device.set_baseline(baseline))?;
         progress.stage("decoding on the device", frames);
         let window = if self.filter.is_on() || self.is_tracked { 1 } else { window };
         let readings_ohm = &self.readings_ohm[..frames * self.per_frame[0]];
