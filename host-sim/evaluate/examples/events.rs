@@ -1,6 +1,7 @@
 //! How well a board tells events of a touch: hits, false alarms and latencies, at rest, in presses and in slips.
 //!
-//! `cargo run -p taxel-evaluate --example events`, which takes half a minute.
+//! `cargo run -p taxel-evaluate --example events`, which takes half a minute, and fails where an event is false or missed that
+//! must not be.
 
 use std::f64::consts::TAU;
 
@@ -10,9 +11,9 @@ use taxel_core::contact::Detector;
 use taxel_core::events::{Events, Kind, Settings, Shown};
 use taxel_core::track::{Frame, State, Tracker};
 use taxel_data::random::{Purpose, Random, Stream};
-use taxel_evaluate::Result;
 use taxel_evaluate::device::{Device, Readout, Wires};
 use taxel_evaluate::experiment::Experiment;
+use taxel_evaluate::{Error, Result};
 use taxel_firmware::readout::Baseline;
 use taxel_learn::cost::Cost;
 use taxel_simulate::sensor::Sensor;
@@ -170,8 +171,9 @@ impl Board<'_> {
         outcomes
     }
 
-    /// Prints what came of all trials with contacts of a depth and speed.
-    fn print(&self, [depth_mm, speed_mm_per_s]: [f64; 2], trials: u64) {
+    /// Prints what came of all trials with contacts of a depth and speed. Returns for each kind whether all were told, and
+    /// whether none was false.
+    fn print(&self, [depth_mm, speed_mm_per_s]: [f64; 2], trials: u64) -> [[bool; 2]; 3] {
         let run = |trial| {
             let index = trial + (1e6 * depth_mm + 1e9 * speed_mm_per_s) as u64;
             let mut random = Random::new(1, Stream::Test, Purpose::Path, index, 0);
@@ -179,12 +181,15 @@ impl Board<'_> {
         };
         let all: Vec<[Outcome; 3]> = (0..trials).into_par_iter().map(run).collect();
         print!("{depth_mm:8.2} {speed_mm_per_s:8.0}");
+        let mut found = [[true; 2]; 3];
         for at in 0..3 {
             let of = || all.iter().map(move |outcomes| &outcomes[at]);
             let mut frames: Vec<usize> = of().flat_map(|it| it.frames.iter().copied()).collect();
             frames.sort_unstable();
-            let hits = format!("{} of {}", frames.len(), of().map(|it| it.all).sum::<usize>());
+            let expected = of().map(|it| it.all).sum::<usize>();
+            let hits = format!("{} of {expected}", frames.len());
             let alarms = of().map(|it| it.false_alarms).sum::<usize>() as f64;
+            found[at] = [frames.len() == expected, alarms == 0.0];
             let per_hour = alarms * 3600.0 / (trials as f64 * TRIAL_S);
             print!(" | {hits:>10} {per_hour:5.0}");
             let Some(last) = frames.len().checked_sub(1) else {
@@ -197,6 +202,7 @@ impl Board<'_> {
             print!(" {median:4} {most:4} {median_ms:7.1} {most_ms:6.1}");
         }
         println!();
+        found
     }
 }
 
@@ -207,7 +213,16 @@ fn main() -> Result<()> {
     let model = blob.parse();
     let tracker = model.tracker().expect("a model that was trained to track");
     let cost = Cost::of_tracker(tracker.sizes());
-    for (readout, samples, load) in [(Readout::OnChip, 12, 0.1), (Readout::Spi, 1, 0.2)] {
+    let mut broken = Vec::new();
+    // With the least depth at which every touch is told.
+    for (readout, samples, load, sure_mm) in
+        [(Readout::OnChip, 12, 0.1, 0.2), (Readout::Spi, 1, 0.2, 1.0)]
+    {
+        let mut hold = |holds: bool, what: String| {
+            if !holds {
+                broken.push(format!("{samples} samples: {what}"));
+            }
+        };
         let (device, wires) = (Device { readout, ..Device::default() }, Wires::of(&scene.world));
         let scan_ms = device.scan_ms(Some(wires), samples);
         let times = device.times(scan_ms, &cost);
@@ -230,13 +245,19 @@ fn main() -> Result<()> {
         println!("Latencies: median and 95 %, in frames and in ms.\n");
         let told = "told false/h  frames           ms";
         println!("depth mm slip mm/s |    touch {told} |     load {told} |     slip {told}");
-        board.print([0.0, 0.0], TRIALS[0]);
+        let at_rest = board.print([0.0, 0.0], TRIALS[0]);
+        hold(at_rest.iter().all(|[_, none_false]| *none_false), "an event at rest".into());
         for depth_mm in [0.05, 0.1, 0.2, 0.5, 1.0] {
-            board.print([depth_mm, 0.0], TRIALS[1]);
+            let [touch, load, slip] = board.print([depth_mm, 0.0], TRIALS[1]);
+            hold(slip[1], format!("a press of {depth_mm} mm that slips"));
+            hold(touch[0] || depth_mm < sure_mm, format!("a touch of {depth_mm} mm is missed"));
+            hold(load[0] || depth_mm < 0.5, format!("a load of {depth_mm} mm is missed"));
         }
         for speed_mm_per_s in [5.0, 10.0, 20.0, 50.0] {
-            board.print([0.5, speed_mm_per_s], TRIALS[2]);
+            let [.., slip] = board.print([0.5, speed_mm_per_s], TRIALS[2]);
+            let what = format!("a slip of {speed_mm_per_s} mm/s is missed");
+            hold(slip[0] || speed_mm_per_s < 20.0, what);
         }
     }
-    Ok(())
+    if broken.is_empty() { Ok(()) } else { Err(Error::failed(broken.join("\n"))) }
 }
