@@ -35,8 +35,8 @@ pub fn run() -> Outcome {
     run_all(steps)
 }
 
-/// Runs what a release needs beside CI: packages, the module of Python, tests with more cases, all scenarios of the emulated
-/// board, a record of it, and exported models in all compilers.
+/// Runs what a release needs beside CI: packages, the module of Python, tests with more cases, errors of a tracker and events
+/// against their bounds, all scenarios of the emulated board, a record of it, and exported models in all compilers.
 pub fn run_before_release() -> Outcome {
     run_all(steps_of_release)
 }
@@ -124,8 +124,13 @@ fn steps_of_release(this: &Path) -> [Vec<Step>; 3] {
     let cases = drawn("cases", "3000", &["extremes", "limits_agree", "number_formats"]);
     let hostile = drawn("hostile", "60000", &["hostile"]);
     let power_cuts = drawn("power-cuts", "30", &["power_cuts"]);
+    // They hold errors of a tracker, and events of a touch, to their bounds.
+    let [tracking, events] = ["tracking", "events"].map(|name| {
+        (name, cargo(&["run", "--quiet", "--package=taxel-evaluate", "--example", name]))
+    });
+    let [publish, python] = ["publish", "python"].map(|name| own(name, &[name]));
     [
-        vec![own("publish", &["publish"]), own("python", &["python"]), cases, hostile, power_cuts],
+        vec![publish, python, cases, hostile, power_cuts, tracking, events],
         vec![own("c", &["c"]), own("board", &["board"])],
         vec![own("faults", &["accept", "--emulated", "--fault", "all"])],
     ]
