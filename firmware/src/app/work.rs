@@ -78,8 +78,10 @@ impl<const ROWS: usize> Work<'_, ROWS> {
             flags |= EstimateReport::CONTACT;
         }
         if let Some(decoder) = &model.decoder {
+            let Configuration { track, filter_lead_us, .. } = sensor.configuration;
+            let tracker = model.tracker.filter(|_| track);
             let frame = sensor.frame_mut();
-            if model.tracker.is_some() {
+            if tracker.is_some() {
                 self.measured.iter_mut().zip(&*frame).for_each(|(place, ohm)| *place = *ohm);
             }
             if !health.is_good() {
@@ -94,9 +96,8 @@ impl<const ROWS: usize> Work<'_, ROWS> {
             if lacks_baseline {
                 flags |= EstimateReport::NO_BASELINE;
             }
-            let Configuration { track, filter_lead_us, .. } = sensor.configuration;
             let mut row_us = [0.0; ROWS];
-            let tracked = scan.zip(model.tracker).filter(|_| track && !lacks_baseline);
+            let tracked = scan.zip(tracker).filter(|_| !lacks_baseline);
             let tracked = tracked.map(|(scan, tracker)| {
                 let frame = track::Frame {
                     readings_ohm: self.measured,

@@ -40,7 +40,7 @@ pub struct Measure {
 }
 
 /// Errors of one group of outputs (an axis, or a column of measured data).
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Errors {
     /// Name of the group: `dz_mm`, or a column's name.
     pub group: String,
@@ -76,14 +76,8 @@ impl Errors {
             unit: "mm".into(),
             count: 10,
             rmse,
-            relative_l2_percent: None,
-            full_scale_percent: None,
-            positional_percent: None,
             r_squared: Some(r_squared),
-            mean_relative_percent: None,
-            ratio_to_limit: None,
-            ratio_standard_error: None,
-            rmse_of_noise: None,
+            ..Self::default()
         }
     }
 }

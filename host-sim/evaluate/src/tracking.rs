@@ -7,7 +7,7 @@ use taxel_learn::tracked::Shares;
 use taxel_simulate::World;
 use taxel_simulate::motion::Dent;
 use taxel_simulate::path::Path;
-use taxel_simulate::sensor::{Sensor, Vector3};
+use taxel_simulate::sensor::{Sensor, Vector3, node};
 
 use crate::error::Result;
 
@@ -86,11 +86,12 @@ fn block(world: &World, sizes: Sizes) -> Result<Vec<f32>> {
         for at in upper {
             places.extend([at[0] as f32, at[1] as f32]);
             for group in columns.chunks(sizes.span) {
-                let change = |moved: &Vector3, (column, of_cell): &(&[Vector3], &f64)| {
-                    (conductance(at, moved, column) - conductance(at, &[0.0; 3], column)) / *of_cell
-                };
+                let rest = group.iter().map(|(column, _)| conductance(at, &[0.0; 3], column));
+                let rest: Vec<f64> = rest.collect();
                 let mean = |moved: &Vector3| {
-                    let changes = group.iter().map(|column| change(moved, column));
+                    let changes = group.iter().zip(&rest).map(|((column, of_cell), rest)| {
+                        (conductance(at, moved, column) - rest) / *of_cell
+                    });
                     changes.sum::<f64>() / group.len() as f64
                 };
                 terms.extend(shares.fit(deformations.iter().map(mean).collect()));
@@ -104,11 +105,7 @@ fn block(world: &World, sizes: Sizes) -> Result<Vec<f32>> {
 
 /// Conductance times g of an electrode at `at` that moved, to the electrodes of a column.
 fn conductance(at: &Vector3, moved: &Vector3, column: &[Vector3]) -> f64 {
-    let to = |lower: &Vector3| {
-        let d = [0, 1, 2].map(|axis| at[axis] - moved[axis] - lower[axis]);
-        1.0 / (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]).sqrt()
-    };
-    column.iter().map(to).sum()
+    column.iter().map(|lower| node(at, moved, lower).1).sum()
 }
 
 /// Deformations of an electrode, down to `deepest_mm`, with shear up to this ratio.

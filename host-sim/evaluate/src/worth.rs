@@ -124,14 +124,8 @@ fn on_folds(selection: &Selection, set: &TrainingSet<'_>) -> Vec<DecoderErrors> 
                 unit: columns::unit_of(group).into(),
                 count: members.iter().map(|column| counts[*column]).sum(),
                 rmse: (squares / members.len() as f64).sqrt(),
-                relative_l2_percent: None,
-                full_scale_percent: None,
-                positional_percent: None,
                 r_squared: r_squared.filter(|it| it.is_finite()),
-                mean_relative_percent: None,
-                ratio_to_limit: None,
-                ratio_standard_error: None,
-                rmse_of_noise: None,
+                ..Errors::default()
             }
         });
         DecoderErrors::new(decoder, errors.collect())

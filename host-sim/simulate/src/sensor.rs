@@ -114,6 +114,12 @@ fn cell(index: usize, count: usize, extent_mm: f64) -> f64 {
     (index as f64 + 0.5) * extent_mm / count as f64
 }
 
+/// Vector d from an electrode of the lower layer to one of the upper that was `moved`, and the conductance 1/‖d‖ between them.
+pub fn node(upper: &Vector3, moved: &Vector3, lower: &Vector3) -> (Vector3, f64) {
+    let d = [0, 1, 2].map(|axis| upper[axis] - moved[axis] - lower[axis]);
+    (d, 1.0 / (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]).sqrt())
+}
+
 impl Sensor {
     /// Sensor of Wang et al. (2014): 8 × 18 wires, 20 × 18 × 5 mm, g = 100 Ω/mm.
     ///
@@ -165,8 +171,7 @@ impl Sensor {
             for (u, delta) in upper.iter().zip(deformation_mm) {
                 let mut slope = [0.0; 3];
                 for l in column {
-                    let d = [0, 1, 2].map(|axis| u[axis] - delta[axis] - l[axis]);
-                    let node = 1.0 / (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]).sqrt();
+                    let (d, node) = node(u, delta, l);
                     conductance_mm += node;
                     slope.iter_mut().zip(d).for_each(|(s, d)| *s += d * node.powi(3));
                 }

@@ -42,6 +42,11 @@ pub(super) fn take_block<'a>(
     take::<&[u8]>(rest, section)
 }
 
+/// Floats of a block.
+fn floats(block: &[u8]) -> Result<&[f32], DecodeError> {
+    bytemuck::try_cast_slice(block).map_err(|_| DecodeError::Malformed { section: "padding" })
+}
+
 /// Cuts the section of relative inputs from the front of `bytes`; returns whether there is one.
 pub(super) fn take_relative_inputs(bytes: &[u8]) -> (bool, &[u8]) {
     match bytes.split_first() {
@@ -82,9 +87,7 @@ pub(super) fn cut_reading_model(
     };
     let (block, rest) = take_block(rest, SECTION)?;
     check_count("bytes of the reading model", sizes.block_floats().saturating_mul(4), block.len())?;
-    let block = bytemuck::try_cast_slice::<u8, f32>(block)
-        .map_err(|_| DecodeError::Malformed { section: "padding" })?;
-    Ok((Some(ReadingModel::of_checked(sizes, block)), rest))
+    Ok((Some(ReadingModel::of_checked(sizes, floats(block)?)), rest))
 }
 
 /// Cuts the tracker from the front of `bytes` if there is one, and checks it.
@@ -104,8 +107,7 @@ pub(super) fn cut_tracker(
         return Err(DecodeError::Malformed { section: SECTION });
     }
     let (block, rest) = take_block(rest, SECTION)?;
-    let block = bytemuck::try_cast_slice::<u8, f32>(block)
-        .map_err(|_| DecodeError::Malformed { section: "padding" })?;
-    let tracker = Tracker::new(sizes, block).map_err(|cause| DecodeError::Tracker { cause })?;
+    let tracker =
+        Tracker::new(sizes, floats(block)?).map_err(|cause| DecodeError::Tracker { cause })?;
     Ok((Some(tracker), rest))
 }

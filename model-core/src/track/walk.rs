@@ -75,10 +75,7 @@ impl Settings {
     pub fn mean_after(&self, mean: &Vector, dt_s: f32) -> Vector {
         let mut later = *mean;
         for (axis, [rate, _, centre]) in self.smooth.into_iter().enumerate() {
-            let [[a, b], [c, d]] = transition(rate, dt_s);
-            let (value, speed) = (mean[axis] - centre, mean[LATENTS + axis]);
-            later[axis] = centre + a * value + b * speed;
-            later[LATENTS + axis] = c * value + d * speed;
+            move_on(&mut later, axis, centre, transition(rate, dt_s));
         }
         later
     }
@@ -91,10 +88,11 @@ impl Settings {
         covariance: &mut Square<NUMBERS>,
     ) {
         let Contact { mean, root, .. } = contact;
-        *mean = self.mean_after(mean, dt_s);
-        for (axis, [rate, ..]) in self.smooth.into_iter().enumerate() {
+        for (axis, [rate, _, centre]) in self.smooth.into_iter().enumerate() {
             let (value, speed) = (axis, LATENTS + axis);
-            let [[a, b], [c, d]] = transition(rate, dt_s);
+            let transition = transition(rate, dt_s);
+            move_on(mean, axis, centre, transition);
+            let [[a, b], [c, d]] = transition;
             let (values, speeds) = (root[value], root[speed]);
             root[value] = core::array::from_fn(|at| a * values[at] + b * speeds[at]);
             root[speed] = core::array::from_fn(|at| c * values[at] + d * speeds[at]);
@@ -152,6 +150,13 @@ impl Settings {
             *latent = latent.max(least).min(most);
         }
     }
+}
+
+/// Lets value and rate of an axis become what a transition makes of them, about the `centre`.
+fn move_on(mean: &mut Vector, axis: usize, centre: f32, [[a, b], [c, d]]: [[f32; 2]; 2]) {
+    let (value, speed) = (mean[axis] - centre, mean[LATENTS + axis]);
+    mean[axis] = centre + a * value + b * speed;
+    mean[LATENTS + axis] = c * value + d * speed;
 }
 
 /// What value and rate become of both after a time.
