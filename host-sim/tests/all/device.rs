@@ -13,7 +13,7 @@ use taxel_firmware::link::message::Configuration;
 use taxel_learn::ModelBlob;
 use taxel_rig::device::check::{Frames, Plan, check};
 use taxel_rig::device::{Device, upload};
-use taxel_simulate::{World, synthesise};
+use taxel_simulate::{Synthesis, World, synthesise};
 
 pub const SOUND: Line = Line { one_in: None };
 
@@ -133,6 +133,26 @@ fn a_device_that_never_pauses_does_not_hold_the_host() {
     // Afterwards the default is active, which has no scans here.
     device.while_paused(Device::identify).unwrap();
     assert_eq!(device.configuration().unwrap().frame_period_us, 0);
+}
+
+#[test]
+fn a_tracker_is_checked_with_the_baseline_of_the_frames_or_with_none() {
+    let mut scene = unrefined("moving");
+    (scene.frames, scene.training.options.centres, scene.training.track) = (500, 4, true);
+    let model = scene.train(&Silent).unwrap();
+    let readings = synthesise(&scene.world, Stream::Test, 40).inputs;
+    let rest = Synthesis::new(&scene.world).untouched().frames(Stream::Test, 1).inputs;
+    // Gains of 2 %, which the device has to know by the baseline, or not at all.
+    let baseline: Vec<f64> = rest.values.iter().map(|ohm| 1.02 * ohm).collect();
+    let start_us: Vec<u64> = (0..40).map(|frame| 10_000 * frame).collect();
+    let mut device = device(SOUND, &model);
+    for baseline_ohm in [Some(baseline), None] {
+        let frames =
+            Frames { readings: readings.clone(), baseline_ohm, start_us: start_us.clone() };
+        let plan = Plan { window: 1, filter: Settings::default() };
+        let findings = check(&mut device, &frames, &model, &plan, &Silent).unwrap();
+        assert_eq!(findings.frames.bit_identical, 40);
+    }
 }
 
 #[cfg(target_os = "linux")]
