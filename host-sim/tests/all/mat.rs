@@ -43,7 +43,7 @@ fn a_mat_of_numbered_columns_is_named_by_wires_and_has_an_image() {
     folder.write("mat.csv", log([16, 16], 200));
     let output = folder.run(&[&TRAIN[..], &["--centres", "8"]].concat());
     let notes = String::from_utf8(output.stderr).unwrap();
-    assert!(notes.contains("note: column-wire 3: none of its readings tells anything"), "{notes}");
+    assert!(notes.contains("note: column-wire 3: none of its readings can be used"), "{notes}");
     let told = String::from_utf8(output.stdout).unwrap();
     // Whether the model is for a device, nobody has said.
     assert!(told.contains("network") && !told.contains("TAXEL_CAPACITY"), "{told}");

@@ -42,7 +42,7 @@ impl DataOptions {
             ));
         }
         for wire in cells.silent_wires(&unused.names()) {
-            common.remark(format_args!("note: {wire}: none of its readings tells anything"));
+            common.remark(format_args!("note: {wire}: none of its readings can be used"));
         }
         let Usual { all, outliers, left_out, digest, folds: given_folds } = self.usual_frames(
             file,
