@@ -192,13 +192,13 @@ mod tests {
         assert_eq!(scans, [0.226, 0.913]);
         // Sums are added up before the next scan, and turned into Ω while it runs.
         let times = onchip.times(Some(0.9), &cost);
-        assert!((times.frame_ms - (0.9 + 0.061 + 0.2 + 0.2)).abs() < 1e-12);
+        assert!((times.frame_ms - (0.9 + 0.061 + 0.16 + 0.2)).abs() < 1e-12);
         assert!((times.period_ms() - 0.961).abs() < 1e-12);
-        assert!((times.age_ms.unwrap() - (0.45 + 0.461 + 0.5 * 0.961)).abs() < 1e-12);
+        assert!((times.age_ms.unwrap() - (0.45 + 0.421 + 0.5 * 0.961)).abs() < 1e-12);
         // With a short scan the processor is what takes longest, and the next frame waits for it.
         let times = onchip.times(Some(0.2), &cost);
-        assert!((times.period_ms() - 0.461).abs() < 1e-12);
-        assert!((times.frame_ms - (0.461 + 0.4)).abs() < 1e-12);
+        assert!((times.period_ms() - 0.421).abs() < 1e-12);
+        assert!((times.frame_ms - (0.421 + 0.36)).abs() < 1e-12);
         let slower = Device { clock_mhz: 90.0, ..board };
         assert_eq!(slower.times(None, &cost).frame_ms, 0.4);
         assert_eq!(slower.times(None, &cost).frames_per_s, 2500.0);
