@@ -454,3 +454,18 @@ fn results_stay_as_they_are() {
     hold("json-keys.txt", &keys);
     hold("printed.txt", &printed);
 }
+
+#[test]
+fn keys_that_the_docs_explain_exist() {
+    let known: BTreeSet<&str> = include_str!("../../../testdata/json-keys.txt")
+        .split(|it: char| it != '_' && !it.is_alphanumeric())
+        .collect();
+    let page = include_str!("../../../docs/json.md");
+    // The first cell of a table's lines.
+    let cells = page.lines().filter_map(|line| line.strip_prefix("| `")?.split(" | ").next());
+    let keys: Vec<&str> =
+        cells.flat_map(|cell| cell.split('`').step_by(2)).map(str::trim).collect();
+    assert!(keys.len() > 50, "{keys:?}");
+    let missing: Vec<_> = keys.iter().filter(|key| !known.contains(**key)).collect();
+    assert!(missing.is_empty(), "docs/json.md explains {missing:?}, which no command prints");
+}
