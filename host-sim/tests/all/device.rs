@@ -136,7 +136,7 @@ fn a_device_that_never_pauses_does_not_hold_the_host() {
 }
 
 #[test]
-fn a_tracker_is_checked_with_the_baseline_of_the_frames_or_with_none() {
+fn a_tracker_is_checked_with_a_baseline_and_without() {
     let mut scene = unrefined("moving");
     (scene.frames, scene.training.options.centres, scene.training.track) = (500, 4, true);
     let model = scene.train(&Silent).unwrap();
