@@ -52,19 +52,17 @@ fn inside(text: &str) -> String {
 /// Pages in the order of the index, under its headings, as mdBook expects them.
 fn summary(index: &str) -> String {
     let mut summary = String::from("# Summary\n\n[What is where](README.md)\n");
-    let mut heading = "";
+    let mut heading = None;
     for line in index.lines() {
         if line.starts_with("## ") {
-            heading = line;
+            heading = Some(&line[1..]);
         } else if line.starts_with("- [")
             && let Some(end) = line.find(')')
         {
-            if !heading.is_empty() {
-                summary.push_str(&format!("\n{}\n\n", &heading[1..]));
-                heading = "";
+            if let Some(heading) = heading.take() {
+                summary.extend(["\n", heading, "\n\n"]);
             }
-            summary.push_str(&line[..=end]);
-            summary.push('\n');
+            summary.extend([&line[..=end], "\n"]);
         }
     }
     summary
