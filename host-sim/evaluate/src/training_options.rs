@@ -114,7 +114,7 @@ pub struct TrainingOptions {
     #[arg(long, value_name = "EXTENT", value_parser = extent())]
     pub reading_model: Option<Extent>,
     /// Give the model a tracker of one contact that moves (docs/rate.md): its deformations are then those of a contact
-    /// that fits the readings of all frames so far. For scenes of one contact; 36 kB for 8 × 18 wires.
+    /// that fits the readings of all frames so far. For scenes of one contact; 12 kB for 8 × 18 wires.
     #[arg(long, action = ArgAction::Set, num_args = 0, default_missing_value = "true")]
     pub track: Option<bool>,
 }

@@ -20,7 +20,7 @@ use super::data_file::FieldArguments;
 #[derive(Clone, Args, Default, Serialize, Deserialize)]
 pub struct BaselineArgument {
     /// CSV file with frames of the untouched sensor, in columns of the same names as the readings. The mean of its lines is the
-    /// baseline of relative inputs, instead of lines at rest, or of a tracker.
+    /// baseline of a tracker, or of relative inputs, instead of lines at rest.
     #[arg(long, value_name = "FILE")]
     pub baseline: Option<PathBuf>,
 }
