@@ -97,7 +97,7 @@ fn layout(show: &str) -> Layout {
         title: title.into(),
         kind,
         source: match kind {
-            Kind::Device => "/dev/ttyACM0, nucleo-f446re, firmware 0.1.0",
+            Kind::Device => "/dev/ttyACM0, nucleo-f446re, firmware 0.2.0",
             Kind::Simulation => "scene press, 0.5 % noise, model press.bin",
             Kind::Recording => "press-2026-11-26.mcap",
         }
