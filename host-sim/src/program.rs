@@ -21,8 +21,8 @@ use crate::commands::{
 /// Without a command: `run press`. Results go to stdout, progress and remarks to stderr. Exit status: 0
 /// done, 1 failed, 2 bad usage or input, 130 interrupted by Ctrl-C, 143 by SIGTERM.
 ///
-/// Files appear whole or not at all: after an error or an interruption the old ones are there, and nothing else. `-o -`
-/// writes to stdout, and results then go to stderr. A link is followed, a read-only file is refused.
+/// Files are written whole or not at all: after an error or an interruption, old files are unchanged and no new ones
+/// are left. `-o -` writes to stdout; results then go to stderr. Links are followed, and read-only files are refused.
 #[derive(Parser)]
 #[command(version)]
 struct Cli {

@@ -58,63 +58,64 @@ pub struct TrainingOptions {
     /// Number of a scene's frames to judge by.
     #[clap(skip)]
     pub test_frames: Option<usize>,
-    /// Centres K; with `train --select`, and in trade and compare, candidates [default: the scene's, or 64; of trade
-    /// 16,32,64,128,256, of a CSV file those that are fewer than its training frames].
+    /// Number of centres K; candidates with `train --select`, and in trade and compare [default: the scene's, or 64;
+    /// for trade 16,32,64,128,256, or those of them below the number of training frames of a CSV file].
     #[arg(long, value_name = "K", value_delimiter = ',')]
     #[serde(default, with = "one_or_more")]
     pub centres: Option<Vec<usize>>,
-    /// Width σ on scaled inputs, where refinement starts; with `train --select`, candidates [default: the scene's, or 0.4;
-    /// 0.8 for the readings of a row].
+    /// Width σ of the Gaussians on scaled inputs, where refinement starts; candidates with `train --select` [default: the
+    /// scene's, or 0.4; 0.8 for the readings of a row].
     #[arg(long, value_name = "S", value_delimiter = ',')]
     #[serde(default, with = "one_or_more")]
     pub spread: Option<Vec<f64>>,
-    /// Ridge penalty on squared weights, for each frame: 1 is as strong as an input that is always 1. More of it
-    /// generalises better from few or noisy frames, or to another day. With `train --select`, candidates [default: 1e-6 for all
-    /// frames together, or 1e-7 a frame if refined].
+    /// Ridge penalty on squared weights, per frame: 1 is as strong as an input that is always 1. A larger penalty
+    /// generalises better from few or noisy frames, or to another day. Candidates with `train --select` [default: 1e-6 for
+    /// all frames together, or 1e-7 per frame if refined].
     #[arg(long, value_name = "P", value_delimiter = ',')]
     #[serde(default, with = "one_or_more")]
     pub penalty: Option<Vec<f64>>,
-    /// Train as the paper does: a network for each row in f32 without an affine tail, centres by K-means, weights by
-    /// recursion, and nothing refined.
+    /// Train as the paper does: a network for each row in f32 without an affine tail, centres from K-means, weights
+    /// from recursive least squares, and no refinement.
     #[arg(long = "paper", action = ArgAction::Set, num_args = 0, default_missing_value = "paper", value_parser = method())]
     pub method: Option<Method>,
     /// Train a network for each row, instead of one for all rows behind a projection of all readings. It is less accurate,
     /// but one missing reading costs only its row.
     #[arg(long, action = ArgAction::Set, num_args = 0, default_missing_value = "true")]
     pub each_row: Option<bool>,
-    /// Features that all readings are projected to: no more than outputs and products of two or three of these [default:
-    /// as many as a row has readings; none for outputs that belong to no row].
+    /// Number of features that all readings are projected to, at most the number of outputs and of products of two or
+    /// three outputs [default: the number of readings of a row; none for outputs that belong to no row].
     #[arg(long, value_name = "F")]
     pub features: Option<usize>,
-    /// Features: `plain`, made of readings as they are; or `normalised`, the shape of a touch apart from its strength, made of
-    /// what exceeds 3 standard deviations of a reading at rest (normalised:K: K of them) [default: those with the least error
-    /// on frames that are held out, for places and for amounts].
+    /// Kind of features: `plain` uses readings as they are; `normalised` separates the shape of a touch from its
+    /// strength, and uses changes of a reading above 3 of its standard deviations at rest (normalised:K: above K)
+    /// [default: the kind with the smaller error on held-out frames, for positions and for amounts].
     #[arg(long, value_name = "KIND", conflicts_with_all = ["method", "each_row"])]
     pub features_kind: Option<Features>,
-    /// Number format of the weights [default: the scene's, or fixed16, or f32 where that does not hold the model].
+    /// Number format of the weights [default: the scene's, or fixed16, or f32 if the model does not fit fixed16].
     #[arg(long, value_name = "FORMAT", value_parser = format())]
     #[serde(default, with = "format_by_name")]
     pub format: Option<Format>,
     /// How output weights are computed. Both ways give the same estimates [default: the scene's, or qr].
     #[arg(long, value_name = "SOLVER", value_parser = solver())]
     pub solver: Option<Solver>,
-    /// Leave centres where K-means puts them, as the paper does. Otherwise centres, widths and the projection are refined
-    /// by their gradient: more accurate at the same cost on the device, and slower to train (docs/training.md).
+    /// Keep the centres of K-means, as the paper does. Otherwise centres, widths and the projection are refined by gradient
+    /// descent: more accurate at the same cost on the device, and slower to train (docs/training.md).
     #[arg(long = "no-refine", action = ArgAction::Set, num_args = 0, default_missing_value = "false")]
     pub refine: Option<bool>,
-    /// Train on readings relative to the baseline, R/R₀, which a drift of the gain leaves as they are
+    /// Train on readings relative to the baseline, R/R₀, which a drift of the gain does not change
     /// (docs/drift.md).
     #[arg(long, action = ArgAction::Set, num_args = 0, default_missing_value = "true")]
     pub relative_inputs: Option<bool>,
-    /// Give the model statistics of its readings (docs/reading-model.md): with fill, it tells missing readings from the others
-    /// of their frame, so that a broken wire costs accuracy, but no frames. With full, it also tells how far off each output
-    /// may be, and how novel a frame is; on a CSV file, that trains once more for every fold: give folds of whole places or
-    /// days (--fold-column), because frames of one resemble each other. Estimates of whole frames stay the same. For 144
-    /// readings, fill takes 7 kB, and full 27 kB. Either takes ten frames of training for each reading.
+    /// Add statistics of the readings to the model (docs/reading-model.md). With fill, it estimates missing readings from
+    /// the others of their frame, so that a broken wire costs accuracy, but no frames. With full, it also estimates how
+    /// far off each output may be, and how novel a frame is. On a CSV file, full trains once more for every fold: give
+    /// folds of whole places or days (--fold-column), because frames of the same place or day resemble each other.
+    /// Estimates of whole frames stay the same. For 144 readings, fill takes 7 kB, and full 27 kB. Both need ten training
+    /// frames for each reading.
     #[arg(long, value_name = "EXTENT", value_parser = extent())]
     pub reading_model: Option<Extent>,
-    /// Give the model a tracker of one contact that moves (docs/rate.md): its deformations are then those of a contact
-    /// that fits the readings of all frames so far. For scenes of one contact; 12 kB for 8 × 18 wires.
+    /// Add a tracker of one moving contact to the model (docs/rate.md): the deformations are then those of a contact
+    /// that fits the readings of all frames so far. Only for scenes of one contact; it takes 12 kB for 8 × 18 wires.
     #[arg(long, action = ArgAction::Set, num_args = 0, default_missing_value = "true")]
     pub track: Option<bool>,
 }

@@ -29,8 +29,8 @@ const PERIOD_US: u32 = 10_000;
 #[command(
     mut_arg("scene", |it| it.help("A built-in scene (paper, press, contact, moving, shear), the path of a scene file, or a CSV file \
                                    with the readings of --model")),
-    mut_arg("model", |it| it.help("Weight blob that the device decodes with; a scene without one trains its own")),
-    mut_arg("frames", |it| it.help("Frames to synthesise; lines of a CSV file are repeated"))
+    mut_arg("model", |it| it.help("Weight blob for the device; without one, a model is trained on the scene")),
+    mut_arg("frames", |it| it.help("Number of frames; lines of a CSV file are repeated if there are fewer"))
 )]
 pub struct CheckArguments {
     #[command(flatten)]

@@ -13,16 +13,16 @@ use crate::{Error, Result};
 /// Options of every command, and who called it.
 #[derive(clap::Args, Default)]
 pub struct Common {
-    /// Seed of every random draw, instead of the scene's or 1 (no effect where nothing is drawn).
+    /// Seed of every random draw, instead of the scene's or 1; it has no effect where nothing is drawn.
     #[arg(long, global = true)]
     pub seed: Option<u64>,
     /// Print the results as JSON.
     #[arg(long, global = true)]
     pub json: bool,
-    /// Say nothing on stderr but errors: no notes, no progress.
+    /// Print only errors on stderr: no notes, no progress.
     #[arg(short, long, global = true)]
     pub quiet: bool,
-    /// Say how long each stage took, and how far a long one is.
+    /// Print how long each stage takes, and the progress of long stages.
     #[arg(short, long, global = true, conflicts_with = "quiet")]
     pub verbose: bool,
     /// Name of the command, and when it began.

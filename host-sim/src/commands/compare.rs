@@ -21,12 +21,12 @@ use super::{Common, arguments, command_line, print};
 
 /// Compare layouts of a sensor: the least possible error, the best decoder, its scan and its cost.
 ///
-/// A scene may have lists where a value is expected, such as `pitch_mm = [3, 4, 5]`: it is then as many layouts, all lists
-/// crossed. Of every layout the most accurate of its decoders is chosen, within the bound; of errors that test frames do not tell
-/// apart, the fastest.
+/// A scene may have lists where a value is expected, such as `pitch_mm = [3, 4, 5]`: every combination of listed values
+/// is then a layout. For every layout, the most accurate decoder within the bound is chosen, or the fastest of those
+/// whose errors do not differ significantly.
 ///
-/// -o writes compare.csv, compare.json, a page compare.html and pictures. Each decoder is kept in points/ there as soon as it is
-/// judged: what was stopped goes on.
+/// -o writes compare.csv, compare.json, a page compare.html and pictures. Each decoder is saved in points/ there as soon
+/// as it is evaluated: a comparison that was stopped continues where it was.
 #[derive(Args)]
 #[command(after_help = "Examples:
   taxel compare thin.toml thick.toml
@@ -37,7 +37,7 @@ pub struct Arguments {
     scenes: Vec<String>,
     #[command(flatten)]
     tried: DecoderArguments,
-    /// Train nothing: the least possible error and the scan alone.
+    /// Train nothing: compute only the least possible error and the scan.
     #[arg(long, conflicts_with = "max_latency_ms")]
     limit_only: bool,
     #[command(flatten)]

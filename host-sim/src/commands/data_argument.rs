@@ -25,31 +25,32 @@ mod load;
 #[derive(Clone, Args, Default, Serialize, Deserialize)]
 #[command(next_help_heading = DATA_FILES)]
 pub struct DataOptions {
-    /// Reading columns of a data file: names with * and ?, and ranges such as c2..c16, comma-separated; !NAME leaves
-    /// columns out [default: r*c*_ohm].
+    /// Columns of readings in a data file: names with * and ?, and ranges such as c2..c16, comma-separated; !NAME
+    /// leaves columns out [default: r*c*_ohm].
     #[arg(long, value_name = "GLOB")]
     inputs: Option<String>,
-    /// Output columns of a data file, in the same way [default: r*e*_d?_mm, r*e*_f?_n and contact_*].
+    /// Columns of outputs in a data file, written in the same way [default: r*e*_d?_mm, r*e*_f?_n and contact_*].
     #[arg(long, value_name = "GLOB")]
     outputs: Option<String>,
-    /// Rows and columns of a mat whose cells are the inputs, row by row, such as 16x16. It is found without this option where
-    /// names say so: r1c1 and so on, or numbers that fill a square of 8x8 or more, from which dead cells may be missing; with
-    /// none they are no mat.
+    /// Rows and columns of a mat whose cells are the inputs, row by row, such as 16x16. The grid is found without this
+    /// option if the names give it: r1c1 and so on, or numbers that fill a square of 8x8 or more, of which dead cells may
+    /// be missing. `none`: the inputs are not a mat.
     #[arg(long, value_name = "ROWSxCOLUMNS|none")]
     #[serde(default, with = "as_text")]
     grid: Option<Grid>,
     /// Column of a CSV file that gives each line's fold (any numbers), instead of random folds.
     #[arg(long, value_name = "NAME", conflicts_with = "folds")]
     fold_column: Option<String>,
-    /// Folds, drawn at random, for cross-validation and for refinement on a CSV file [default: 5 where neighbouring lines
-    /// do not resemble each other].
+    /// Number of random folds for cross-validation and for refinement on a CSV file [default: 5 if neighbouring lines do
+    /// not resemble each other].
     #[arg(long, value_name = "N")]
     folds: Option<usize>,
-    /// Folds of successive lines of a CSV file, instead of random ones [default: 5 where neighbouring lines resemble each
-    /// other, as in a log: random folds would judge a model by frames that it nearly knows].
+    /// Number of folds of successive lines of a CSV file, instead of random folds [default: 5 if neighbouring lines
+    /// resemble each other, as in a log, where random folds would test a model on frames almost equal to its training
+    /// frames].
     #[arg(long, value_name = "N", conflicts_with_all = ["folds", "fold_column"])]
     fold_blocks: Option<usize>,
-    /// Train on the lines of a CSV file that hold an outlier, too: a value far from all others in its column.
+    /// Also train on lines of a CSV file with an outlier: a value far from all others in its column.
     #[arg(long)]
     #[serde(default, skip_serializing_if = "Not::not")]
     keep_outliers: bool,
@@ -124,8 +125,8 @@ impl DataOptions {
         [self.inputs.as_deref(), self.outputs.as_deref()]
     }
 
-    /// Readings of the untouched sensor in the columns called `inputs`: from a file of their own, or lines of the log `file` by
-    /// its `outputs`. Inputs relative to the baseline need them.
+    /// Readings of the untouched sensor in the columns called `inputs`: from a file of their own, or lines of the log
+    /// `file` by its `outputs`. Inputs relative to the baseline need them.
     fn rest(
         &self,
         file: &DataFile,

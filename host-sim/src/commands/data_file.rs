@@ -27,10 +27,10 @@ pub struct DataFileArguments {
     #[command(flatten)]
     #[serde(flatten)]
     fields: FieldArguments,
-    /// Use the first lines alone, this share of all: 0.8 leaves out the last fifth.
+    /// Use only the first lines, this share of all: 0.8 leaves out the last fifth.
     #[arg(long, value_name = "SHARE")]
     first_share: Option<f64>,
-    /// Use the last lines alone, this share of all: 0.2 is what --first-share 0.8 leaves out.
+    /// Use only the last lines, this share of all: 0.2 uses what --first-share 0.8 leaves out.
     #[arg(long, value_name = "SHARE", conflicts_with = "first_share")]
     last_share: Option<f64>,
 }
@@ -39,8 +39,8 @@ pub struct DataFileArguments {
 #[derive(Clone, Args, Default, Serialize, Deserialize)]
 #[command(next_help_heading = DATA_FILES)]
 pub struct TimeArgument {
-    /// Column of a log with the time of each line [default: one called time, t, timestamp, …; without one lines are
-    /// counted].
+    /// Column of a log that holds the time of each line [default: a column called time, t, timestamp, …; without
+    /// one, lines are counted].
     #[arg(long, value_name = "NAME")]
     pub time: Option<String>,
 }
@@ -48,24 +48,25 @@ pub struct TimeArgument {
 /// What the fields of a data file mean.
 #[derive(Clone, Args, Default, Serialize, Deserialize)]
 pub struct FieldArguments {
-    /// Take the first line of a CSV file as names even if it holds numbers alone. Otherwise such a file has no header,
+    /// Read the first line of a CSV file as names even if it holds only numbers. Otherwise such a file has no header,
     /// and its columns are called c1, c2, …
     #[arg(long)]
     #[serde(default, skip_serializing_if = "Not::not")]
     header: bool,
-    /// Numbers that stand for a missing value, such as -1.
+    /// Numbers that mark a missing value, such as -1.
     #[arg(long, value_name = "VALUE", value_delimiter = ',')]
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     missing: Vec<f64>,
-    /// Separator between the fields of a text file, which is otherwise found: comma, semicolon, tab, space, or another
+    /// Separator between the fields of a text file, instead of the detected one: comma, semicolon, tab, space, or another
     /// character.
     #[arg(long, value_name = "NAME")]
     #[serde(default, with = "as_text")]
     separator: Option<Separator>,
-    /// Decimal sign of a text file, which is otherwise found.
+    /// Decimal sign of a text file, instead of the detected one.
     #[arg(long, value_enum, value_name = "SIGN")]
     decimal: Option<Decimal>,
-    /// Refuse a text file with a line that is cut or garbled. Otherwise such lines are skipped, if no more than 5 % are.
+    /// Refuse a text file with a line that is cut or garbled. Otherwise such lines are skipped if they are at most 5 % of
+    /// all.
     #[arg(long)]
     #[serde(default, skip_serializing_if = "Not::not")]
     strict: bool,

@@ -25,17 +25,17 @@ use super::recordings::{self, is_recording};
 use super::rest_argument::UntouchedArguments;
 use super::{Common, arguments, print};
 
-/// Decode readings from a data file to CSV, one line of estimates a line; or to a recording (.mcap), with the readings too.
+/// Decode readings of a data file to CSV (one line of estimates per line) or, with the readings, to a recording (.mcap).
 ///
-/// Where a reading is missing, the outputs of its row-wire are left empty. If one network decodes the whole
-/// array, all outputs of the line are. A place is left empty where nothing touches. A model trained with --reading-model
-/// tells missing readings from the others instead.
-/// A model with a tracker (`train --track`) follows the contact from line to line, if the file has times.
-/// Estimates are written with the digits that tell an f32 from its neighbours.
+/// If a reading is missing, the outputs of its row-wire are left empty; if one network decodes the whole
+/// array, all outputs of the line are. Positions are left empty while nothing touches the sensor. A model trained with
+/// --reading-model estimates missing readings from the others instead.
+/// A model with a tracker (`train --track`) follows the contact from line to line if the file has times.
+/// Estimates are written with enough digits to restore the f32.
 ///
-/// The last column, `status`, is the sum of a device's flags (docs/link.md): 0 for a sound frame, 2 a faulty reading,
-/// 4 overflow, 64 a reading far beyond the training range was clamped, 128 novel (with --confidence). Faulty readings are
-/// noted by wire and column on stderr.
+/// The last column, `status`, is the sum of a device's flags (docs/link.md): 0 is a good frame, 2 a faulty reading,
+/// 4 overflow, 64 a clamped reading far outside the training range, 128 a novel frame (with --confidence). Faulty readings
+/// are reported by wire and column on stderr.
 #[derive(Args)]
 #[command(after_help = "Examples:
   taxel decode press.bin readings.csv -o estimate.csv
@@ -46,15 +46,15 @@ use super::{Common, arguments, print};
 pub struct Arguments {
     /// Weight blob.
     model: PathBuf,
-    /// CSV file or recording (.mcap) with the model's reading columns, in any order, among others.
+    /// CSV file or recording (.mcap) that has the columns of the model's readings, in any order.
     readings: PathBuf,
     #[command(flatten)]
     to: arguments::OutputFile,
-    /// Columns of the readings' file that are written too, as they stand there, in front of the estimates: the time, say.
+    /// Columns of the file of readings that are copied unchanged in front of the estimates, such as the time.
     #[arg(long, value_name = "NAME,…", value_delimiter = ',')]
     keep: Vec<String>,
-    /// Also write a column NAME_deviation for each output NAME, and novelty_nats, of a model trained with --reading-model
-    /// full: 68 % of errors are within one deviation, and above 0 a frame is novel (docs/reading-model.md).
+    /// Also write a column NAME_deviation for each output NAME, and novelty_nats, for a model trained with --reading-model
+    /// full: 68 % of errors are within one deviation, and a frame with a novelty above 0 is novel (docs/reading-model.md).
     #[arg(long)]
     confidence: bool,
     #[command(flatten)]
@@ -263,7 +263,8 @@ fn clock_us(file: &DataFile) -> Result<Vec<u64>> {
     Ok(since_first.map(|time_us| time_us.round() as u64).collect())
 }
 
-/// Writes a recording of readings (frames × inputs) with the times of their scans, of the estimates, and of their deviations.
+/// Writes a recording of readings (frames × inputs) with the times of their scans, of the estimates, and of their
+/// deviations.
 fn record(
     path: &Path,
     blob: &ModelBlob,

@@ -10,18 +10,19 @@ use super::arguments::of_option;
 /// Decoders and scans to try, and the choice among them.
 #[derive(Args)]
 pub struct DecoderArguments {
-    /// Numbers of samples averaged for each reading, to try: more lower the noise, and make the scan longer [default: 1].
+    /// Numbers of samples to average for each reading, to try: more samples lower the noise and make the scan longer
+    /// [default: 1].
     #[arg(long, value_name = "N,…", value_delimiter = ',')]
     pub average: Vec<usize>,
-    /// Readout: the board's own converters, which scan while the frame before is decoded (docs/board.md), or converters on the
-    /// SPI of a board of your own.
+    /// Readout: the board's own converters, which scan while the previous frame is decoded (docs/board.md), or converters
+    /// on the SPI of your own board.
     #[arg(long, value_enum, default_value_t = ReadoutOption::Onchip)]
     pub readout: ReadoutOption,
     /// Choose among decoders that take at most so many ms, from the start of a scan to its estimate.
     #[arg(long, value_name = "MS")]
     pub max_latency_ms: Option<f64>,
-    /// Outputs that determine the choice, such as dz_mm; in trade also all, by the mean of RMSE/standard deviation
-    /// [default: the last of a scene, all of a data file].
+    /// Outputs that determine the choice, such as dz_mm; in trade also all, which uses the mean of RMSE/standard
+    /// deviation [default: the last of a scene, all of a data file].
     #[arg(long, value_name = "GROUP")]
     pub group: Option<String>,
     #[command(flatten)]
@@ -31,8 +32,8 @@ pub struct DecoderArguments {
 /// Frames of a scene on which the least possible error is computed.
 #[derive(Args, Default)]
 pub struct LimitArgument {
-    /// Test frames on which the least possible error is computed; of contacts that move, trajectories, which take a second or more
-    /// each [default: as many as suffice, and none of contacts that move].
+    /// Number of test frames on which the least possible error is computed. For contacts that move, it is a number of
+    /// trajectories, which take a second or more each [default: as many as needed; none for contacts that move].
     #[arg(long, value_name = "N", value_parser = value_parser!(u16).range(2..))]
     pub limit_frames: Option<u16>,
 }
@@ -47,7 +48,7 @@ impl LimitArgument {
 /// Time of a scan, of which the board's own is known.
 #[derive(Args)]
 pub struct ScanTimeArgument {
-    /// Time in ms of a scan of one sample a reading, which reads rows one after the other [default: what the board's takes].
+    /// Time in ms of a scan with one sample per reading, which reads rows one after another [default: that of the board].
     #[arg(long, value_name = "MS")]
     pub scan_ms: Option<f64>,
 }

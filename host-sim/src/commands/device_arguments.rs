@@ -15,7 +15,7 @@ const FLEXITAC_SHAPE: [usize; 2] = [16, 32];
 /// Speed of a serial line.
 #[derive(Args, Serialize)]
 pub struct BaudArgument {
-    /// Speed of the line in bits a second [default: the board's; 2000000 of flexitac].
+    /// Speed of the line in bits a second [default: the board's; 2000000 for flexitac].
     #[arg(long, value_name = "BAUD", value_parser = value_parser!(u32).range(1..))]
     pub baud: Option<u32>,
 }
@@ -23,10 +23,10 @@ pub struct BaudArgument {
 /// How a sensor on a serial port is read.
 #[derive(Args, Serialize)]
 pub struct SensorArguments {
-    /// How a sensor on a serial port tells its readings [default: taxel].
+    /// How a sensor on a serial port sends its readings [default: taxel].
     #[arg(long, value_enum, value_name = "NAME")]
     protocol: Option<Protocol>,
-    /// Rows and columns of a sensor that does not tell them, such as 16x32 [default of flexitac: 16x32].
+    /// Rows and columns of a sensor that does not report them, such as 16x32 [default for flexitac: 16x32].
     #[arg(long, value_name = "ROWSxCOLUMNS", value_parser = shape)]
     shape: Option<[usize; 2]>,
 }

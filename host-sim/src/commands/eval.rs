@@ -30,8 +30,8 @@ use super::{Common, command_line, print};
 
 /// Evaluate a model on a CSV file of readings and true outputs.
 ///
-/// Readings that a device would not believe count as missing. A model trained with --reading-model tells them from the others;
-/// --without shows what that costs.
+/// Readings that a device would reject count as missing. A model trained with --reading-model estimates them from the
+/// others; --without shows what that costs.
 #[derive(Args)]
 #[command(after_help = "Examples:
   taxel eval press.bin test.csv --html report.html
@@ -41,13 +41,13 @@ use super::{Common, command_line, print};
 pub struct Arguments {
     /// Weight blob.
     model: PathBuf,
-    /// CSV file or recording (.mcap) with the model's reading and output columns.
+    /// CSV file or recording (.mcap) that has the columns of the model's readings and outputs.
     data: PathBuf,
     #[command(flatten)]
     untouched: UntouchedArguments,
     #[command(flatten)]
     health: HealthArguments,
-    /// Write a page with the same figures as run's.
+    /// Write a page with the same figures as that of `run`.
     #[arg(long, value_name = "FILE")]
     html: Option<PathBuf>,
     #[command(flatten)]
@@ -261,8 +261,8 @@ fn knows(metadata: &Metadata<'_>, file: &DataFile) -> Result<bool> {
     Ok(metadata.training_frames as usize > others + others / ONE_IN)
 }
 
-/// What was judged, and by what. `counts` are of frames that count and that lack a reading, of true outputs that count and of
-/// all.
+/// What was judged, and by what. `counts` are of frames that count and that lack a reading, of true outputs that count
+/// and of all.
 fn made(
     arguments: &Arguments,
     (blob, file): (&ModelBlob, &DataFile),

@@ -15,11 +15,11 @@ use super::{Common, print};
 
 /// Write a model as source code in C or Rust, for a program that never changes its model.
 ///
-/// In C, it is a library in a folder: one source file in C99 with its header, and what CMake, Arduino, PlatformIO and Zephyr
-/// need. It needs no heap and no other library, holds any model, and gives the bits that the blob gives (docs/c.md).
+/// The C export is a library in a folder: one C99 source file with its header, and files for CMake, Arduino, PlatformIO and
+/// Zephyr. It needs no heap and no other library, supports every model, and equals the blob bit for bit (docs/c.md).
 ///
-/// In Rust, it is a file of arrays of fixed size, and functions that call `taxel_core` with them. Nothing in it is parsed, and
-/// nothing can fail. It holds any model, too, and gives the bits that the blob gives (docs/c.md).
+/// The Rust export is a file of arrays of fixed size, and functions that call `taxel_core` with them. Nothing is parsed
+/// at run time, and nothing can fail. It supports every model, too, and equals the blob bit for bit (docs/c.md).
 #[derive(Args)]
 #[command(group(ArgGroup::new("language").required(true)))]
 #[command(after_help = "Examples:
@@ -29,10 +29,10 @@ use super::{Common, print};
 pub struct Arguments {
     /// Weight blob.
     model: PathBuf,
-    /// Folder to write as a library in C: a new one, or that of an earlier export under this name.
+    /// Folder to write the C library to: a new one, or that of an earlier export under this name.
     #[arg(long, value_name = "DIR", group = "language")]
     c: Option<PathBuf>,
-    /// Name of the library, with which all that it declares begins, in small letters.
+    /// Name of the library in lower-case letters; all its declarations begin with it.
     #[arg(long, value_parser = Name::new, default_value = "taxel_model", conflicts_with = "rust")]
     name: Name,
     #[command(flatten)]

@@ -9,10 +9,10 @@ use taxel_data::{Clock, DataFile};
 /// Options of the filter in time.
 #[derive(Args, Serialize)]
 pub struct FilterArguments {
-    /// Filter outputs in time, with this time constant in ms; 0 filters nothing (docs/rate.md).
+    /// Filter outputs over time with this time constant in ms; 0 turns the filter off (docs/rate.md).
     #[arg(long, value_name = "MS", value_parser = milliseconds)]
     pub filter_ms: Option<u32>,
-    /// Time in ms by which the filter or the tracker extrapolates outputs: their age when they are used.
+    /// Time in ms by which the filter or the tracker extrapolates outputs, usually their age when they are used.
     #[arg(long, value_name = "MS", value_parser = milliseconds)]
     pub lead_ms: Option<u32>,
 }
@@ -30,7 +30,7 @@ impl FilterArguments {
 /// Option for frames without times.
 #[derive(Args)]
 pub struct PeriodArgument {
-    /// Time in ms from one frame to the next, for the filter or the tracker; without it a file's column with the time tells.
+    /// Time in ms from one frame to the next, for the filter or the tracker [default: from the file's column of times].
     #[arg(long, value_name = "MS", value_parser = period)]
     pub period_ms: Option<u32>,
 }

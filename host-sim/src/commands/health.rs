@@ -19,10 +19,10 @@ const MOST_NAMED: usize = 5;
 pub struct HealthArguments {
     #[command(flatten)]
     limits: LimitsArgument,
-    /// Columns whose readings are taken for missing in every line.
+    /// Columns whose readings count as missing in every line.
     #[arg(long, value_name = "GLOB,…")]
     without: Option<String>,
-    /// Leave missing readings missing, also if the model can fill them from the others (train --reading-model).
+    /// Do not fill missing readings, even if the model can (train --reading-model).
     #[arg(long)]
     no_fill: bool,
 }
@@ -30,8 +30,8 @@ pub struct HealthArguments {
 /// Limits of readings in Ω.
 #[derive(Debug, Clone, Copy, Args)]
 pub struct LimitsArgument {
-    /// Readings in Ω outside of these limits count as missing (shorted or open), as on a device, and those of a baseline
-    /// too. `none` believes all. Columns whose names do not end with _ohm have no limits.
+    /// Readings in Ω outside these limits count as missing (shorted or open), as on a device; so do those of a baseline.
+    /// `none` accepts all. Columns whose names do not end in _ohm have no limits.
     #[arg(long, value_name = "LOW,HIGH", value_parser = limits, default_value = "5,1000")]
     limits: Believed,
 }

@@ -20,7 +20,7 @@ use taxel_rig::image;
 use super::model_outputs;
 use super::{Common, print};
 
-/// Show a blob's shape, origin, training errors and needs on a device.
+/// Show a blob's shape, origin, training errors, and what it needs on a device.
 #[derive(Args)]
 #[command(after_help = "Example: taxel inspect press.bin")]
 pub struct Arguments {

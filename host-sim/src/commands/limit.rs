@@ -20,13 +20,14 @@ const FILES: FileSet = FileSet {
     inner: report::figures_named(&["limit-by-noise", "directions*", "known*"]),
 };
 
-/// Compute the least possible error of any decoder, and which directions the sensor shows.
+/// Compute the least possible error of any decoder, and which directions of deformation the readings show.
 ///
-/// The least RMSE is that of the posterior mean E[Δ | readings]. It is sampled for a number of test frames, from the
-/// scene's own prior and noise, for ideal readings: a drift of the gain, circuits and time are not modelled. A figure
-/// that the sample does not carry is refused (docs/what-the-sensor-knows.md).
+/// The least RMSE is that of the posterior mean E[Δ | readings], sampled for a number of test frames from the scene's
+/// own prior and noise. Readings are ideal: drift of the gain, circuits and time are not modelled. A figure for
+/// which the sample is too small is refused (docs/what-the-sensor-knows.md).
 ///
-/// -o writes limit.json, a page limit.html, and its figures/ by themselves; of several scenes, to a folder for each, by its name.
+/// -o writes limit.json, a page limit.html, and its figures/; for several scenes, to a folder for each, named after the
+/// scene.
 #[derive(Args)]
 #[command(after_help = "Examples:
   taxel limit press --row 4 --noise 0.005,0.01 -o out/limit
@@ -45,7 +46,7 @@ pub struct Arguments {
     /// Test frames [default: 400, or 400 posteriors of rows where rows move independently].
     #[arg(short = 'n', long, value_name = "N")]
     frames: Option<usize>,
-    /// Models of the scenes to judge on the same frames: their errors, and the ratios of these to the limit.
+    /// Models of the scenes to evaluate on the same frames: their errors, and the ratios of these to the limit.
     #[arg(long, value_name = "FILE,…", value_delimiter = ',')]
     model: Vec<PathBuf>,
     #[command(flatten)]

@@ -42,7 +42,7 @@ enum Action {
     /// Show the device's identity, active model, use of memory, and counters.
     #[command(after_help = "Example: taxel link /dev/ttyACM0 identify")]
     Identify,
-    /// Upload a model and activate it; if refused, the previous one stays.
+    /// Upload a model and activate it; if it is refused, the previous one stays active.
     ///
     /// The model is on trial until the device is seen to decode and scan with it. Until then a restart returns to the
     /// previous one, whatever caused it.
@@ -51,7 +51,7 @@ enum Action {
     /// Confirm the model that `upload --trial` left on trial: it stays active over restarts.
     #[command(after_help = "Example: taxel link /dev/ttyACM0 confirm")]
     Confirm,
-    /// Let the device scan, and save readings or estimates as CSV; or as a recording (.mcap), with both.
+    /// Save readings or estimates of the device as CSV, or both as a recording (.mcap).
     ///
     /// A recording is written while frames come, and survives a kill (docs/live.md). With --protocol, another sensor is
     /// recorded, and MODEL decodes on this computer.
@@ -70,24 +70,24 @@ enum Action {
     /// Set the constants of the device's circuit, and keep them over restarts.
     #[command(after_help = "Example: taxel link /dev/ttyACM0 constants circuit.toml")]
     Constants(constants::Arguments),
-    /// Mend the device's model after the sensor has changed, from reference presses, and upload it.
+    /// Recalibrate the device's model by reference presses after the sensor has changed, and upload it.
     ///
-    /// Each line of PRESSES tells what the outputs truly are. With columns of the readings as well, these are taken;
-    /// otherwise the device scans, and you are asked for one press after the other. -o saves the mended model too: `record` and
-    /// the next recalibration take it. docs/drift.md has more.
+    /// Each line of PRESSES has the true outputs of a press. If it also has columns of the readings, these are used;
+    /// otherwise the device scans, and you are asked for one press after another. -o saves the recalibrated model, which
+    /// `record` and the next recalibration need. docs/drift.md has more.
     #[command(
-        after_help = "Example: taxel link /dev/ttyACM0 recalibrate press.bin presses.csv -o mended.bin"
+        after_help = "Example: taxel link /dev/ttyACM0 recalibrate press.bin presses.csv -o recalibrated.bin"
     )]
     Recalibrate(recalibrate::Arguments),
     /// Return to the model that was active before the last recalibration or upload, or before the trial.
     #[command(after_help = "Example: taxel link /dev/ttyACM0 undo")]
     Undo,
-    /// Show configuration, constants and baseline, and what of them is kept over restarts.
+    /// Show configuration, constants and baseline, and which of them are kept over restarts.
     #[command(after_help = "Example: taxel link /dev/ttyACM0 settings")]
     Settings(settings::SettingsArguments),
-    /// Let the device decode a scene's frames, and compare with the host bit for bit.
+    /// Decode a scene's frames on the device, and compare with the host bit for bit.
     ///
-    /// The model that is checked with replaces the active one.
+    /// The model of the check replaces the active one.
     #[command(after_help = "Example: taxel link /dev/ttyACM0 check press --model press.bin")]
     Check(CheckArguments),
 }
@@ -115,8 +115,8 @@ impl Arguments {
 struct UploadArguments {
     /// Weight blob.
     model: PathBuf,
-    /// Leave the model on trial, until `confirm`. Without that, the previous one comes back after so many minutes, or at
-    /// the next restart.
+    /// Leave the model on trial, until `confirm`. Without it, the device returns to the previous model after so many
+    /// minutes, or at the next restart.
     #[arg(
         long,
         value_name = "MINUTES",

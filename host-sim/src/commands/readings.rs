@@ -19,8 +19,8 @@ use super::data_file::FieldArguments;
 /// Baseline of the sensor that readings are from.
 #[derive(Clone, Args, Default, Serialize, Deserialize)]
 pub struct BaselineArgument {
-    /// CSV file with frames of the untouched sensor, in columns of the same names as the readings. The mean of its lines is the
-    /// baseline of a tracker, or of relative inputs, instead of lines at rest.
+    /// CSV file with frames of the untouched sensor, in columns with the same names as the readings. The mean of its
+    /// lines is the baseline of a tracker, or of relative inputs instead of lines at rest.
     #[arg(long, value_name = "FILE")]
     pub baseline: Option<PathBuf>,
 }
@@ -42,7 +42,8 @@ impl BaselineArgument {
     }
 
     /// Baseline in the readings' units, for the model with this `metadata`, which was read from `path`; `None` for a
-    /// model that needs none. `or` says what else could tell it. `fields` says how its file is read, and readings outside the `limits` count as missing.
+    /// model that needs none. `or` says what else could tell it. `fields` says how its file is read, and readings outside
+    /// the `limits` count as missing.
     pub fn values(
         &self,
         metadata: &Metadata<'_>,

@@ -20,8 +20,9 @@ use super::readings::BaselineArgument;
 #[derive(Clone, Args, Default, Serialize, Deserialize)]
 #[command(next_help_heading = DATA_FILES)]
 pub struct RestArgument {
-    /// Columns of a log that are zero while nothing touches the sensor; lines at which all of them are make the baseline of the
-    /// lines that follow. `none`: no line does [default: outputs of force, weight, pressure and deformation].
+    /// Columns of a log that are zero while nothing touches the sensor. Lines where all of them are zero give the
+    /// baseline of the lines that follow. `none`: no line is at rest [default: outputs of force, weight, pressure and
+    /// deformation].
     #[arg(long, value_name = "GLOB", conflicts_with = "baseline")]
     rest: Option<String>,
 }
@@ -32,8 +33,8 @@ impl RestArgument {
         self.rest.is_some()
     }
 
-    /// Columns of `file` that are zero while nothing touches: those that a user named, or those of the `outputs` that tell it;
-    /// `None` if no line is to be taken for one at rest.
+    /// Columns of `file` that are zero while nothing touches: those that a user named, or those of the `outputs` that
+    /// tell it; `None` if no line is to be taken for one at rest.
     fn columns<'n>(
         &self,
         file: &DataFile,
@@ -185,9 +186,9 @@ impl UntouchedArguments {
         Ok(rest)
     }
 
-    /// Baseline of each of so many `lines` of a log, or one for all of them, for the model with this `metadata`, which was
-    /// read from `path`; `None` for a model that needs none. Unless a file was given for it, it is that of the log's own lines
-    /// at `rest`.
+    /// Baseline of each of so many `lines` of a log, or one for all of them, for the model with this `metadata`, which
+    /// was read from `path`; `None` for a model that needs none. Unless a file was given for it, it is that of the log's
+    /// own lines at `rest`.
     pub fn baselines(
         &self,
         metadata: &Metadata<'_>,

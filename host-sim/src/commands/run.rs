@@ -38,9 +38,9 @@ const FILES: FileSet = FileSet {
 
 /// Do the whole job for a scene or a CSV file: train, write the blob, evaluate, report.
 ///
-/// Writes model.bin, metrics.json, table1.csv, report.html and its figures/ to `out/<name>/` (-o: `DIR/<name>/`), all together at
-/// the end;
-/// those of an earlier run go. Frames of a scene are synthesised. Of a CSV file, the last fifth is held out to judge by.
+/// Writes model.bin, metrics.json, table1.csv, report.html and its figures/ to `out/<name>/` (-o: `DIR/<name>/`), all
+/// together at the end, and removes those of an earlier run. The frames of a scene are synthesised. The last fifth of a
+/// CSV file is held out for evaluation.
 #[derive(Args, Default)]
 #[command(after_help = "Examples:
   taxel run press --noise 0.01 -o out/noise-1

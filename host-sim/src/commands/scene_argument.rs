@@ -89,9 +89,9 @@ pub struct FramesArgument {
 /// Frames a second.
 #[derive(Args)]
 pub struct FrameRateArgument {
-    /// Frames a second. `synth` gives frames of moving contacts or of the untouched sensor a time by it [default of moving
-    /// contacts: as many as the board scans]; `view` shows so many of a simulation or a data file [default: 100, or what the
-    /// file's times tell].
+    /// Frames a second. `synth` uses it for the times of moving contacts or of the untouched sensor [default for moving
+    /// contacts: the rate of the board]; `view` plays a simulation or a data file at this rate [default: 100, or by the
+    /// file's times].
     #[arg(long, value_name = "HZ", value_parser = rate)]
     pub frame_rate: Option<f64>,
 }

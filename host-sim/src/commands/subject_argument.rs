@@ -27,7 +27,7 @@ pub struct SubjectArgument {
     source: Option<String>,
     #[command(flatten)]
     options: SubjectOptions,
-    /// CSV file with frames to judge by, in the same columns [default: the last fifth of the lines is held out, or the
+    /// CSV file with test frames, in the same columns [default: the last fifth of the lines is held out, or the
     /// last fold of --fold-column].
     #[arg(long, value_name = "FILE", help_heading = DATA_FILES)]
     test: Option<PathBuf>,

@@ -21,14 +21,14 @@ mod estimate;
 
 /// Compute every point of a plan: many scenes, devices and models, here or on many machines.
 ///
-/// A plan (docs/sweeps.md) has a scene and axes. Every point becomes a file in DIR/points, which is whole or not there. What is
-/// there already is not computed again, so a sweep that was stopped goes on. When all points are there, results.csv,
-/// results.json, results.html and two pictures are written to DIR, which is out/NAME after the plan's name unless -o says
-/// otherwise.
+/// A plan (docs/sweeps.md) has a scene and axes. Every point is saved as a file in DIR/points. Points that are there
+/// already are not computed again, so a sweep that was stopped continues where it was. When all points are done,
+/// results.csv, results.json, results.html and two pictures are written to DIR, which is out/NAME after the plan's name
+/// unless -o says otherwise.
 ///
-/// On a cluster, every machine computes a shard (--shard, or --shards in an array of Slurm or HyperQueue, or in GNU parallel),
-/// and --merge reads what all of them wrote; -o is then the file for the table of results (.csv), beside which the others are
-/// written. Results do not depend on how the plan was cut.
+/// On a cluster, every machine computes a shard (--shard, or --shards in an array of Slurm or HyperQueue, or in GNU
+/// parallel), and --merge reads what all of them wrote; -o is then the file for the table of results (.csv), and the
+/// others are written beside it. Results do not depend on the number of shards.
 #[derive(Args)]
 // A plan has its own seeds.
 #[command(arg = Arg::new("seed").long("seed").value_parser(value_parser!(u64)).hide(true))]
@@ -53,10 +53,10 @@ pub struct Arguments {
     /// `PARALLEL_SEQ`, from 1) [default, in an array of Slurm: its number of tasks].
     #[arg(long, value_name = "N", conflicts_with_all = ["shard", "merge", "dry_run"])]
     shards: Option<usize>,
-    /// Read the results in this folder of a sweep, and write them as a table, a page and pictures.
+    /// Write the results in this folder of a sweep as a table, a page and pictures.
     #[arg(long, value_name = "DIR", conflicts_with = "dry_run", value_parser = arguments::folder())]
     merge: Option<PathBuf>,
-    /// Compute a few points, and say how long all would take and how much memory.
+    /// Compute a few points, and estimate the time and memory that all would take.
     #[arg(long, conflicts_with = "output")]
     dry_run: bool,
 }

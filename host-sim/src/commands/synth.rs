@@ -19,11 +19,11 @@ use crate::live::replay::USUAL_RATE;
 use crate::live::sheet;
 use crate::report::Sections;
 
-/// Synthesise frames of a scene as CSV: noisy readings, then true outputs, one frame a line; or as a recording (.mcap,
+/// Synthesise frames of a scene as CSV (one frame per line: noisy readings, then true outputs) or as a recording (.mcap,
 /// docs/live.md).
 ///
-/// A scene whose contacts move (`[motion]`) is written as a log: time_s and trajectory come first, and each row is read at its
-/// own time, as the board scans. A second lies between two trajectories, so that a filter starts anew with each.
+/// A scene whose contacts move (`[motion]`) is written as a log: time_s and trajectory come first, and each row is read
+/// at its own time, as the board scans. Trajectories are one second apart, so that a filter restarts with each.
 #[derive(Args)]
 #[command(after_help = "Examples:
   taxel synth press -n 5000 --seed 2 -o test.csv
@@ -31,7 +31,7 @@ use crate::report::Sections;
   taxel synth moving -n 6000 --frame-rate 1000 --scan-ms 0.9 -o touches.csv
   taxel synth press -n 6000 --untouched --frame-rate 500 -o rest.csv
 
-A scene's own seed gives the very frames that `train` and `run` train on: evaluate on another.")]
+A scene's own seed gives the frames that `train` and `run` train on: use another seed to evaluate.")]
 pub struct Arguments {
     #[command(flatten)]
     scene: SceneArgument,
@@ -39,17 +39,17 @@ pub struct Arguments {
     noise: NoiseArgument,
     #[command(flatten)]
     count: FramesArgument,
-    /// Leave the sensor untouched: frames of which a baseline is made.
+    /// Synthesise frames of the untouched sensor, for a baseline.
     #[arg(long)]
     untouched: bool,
-    /// Write still contacts of a scene whose contacts move: what its model is trained on.
+    /// Synthesise still contacts of a scene whose contacts move, as its model is trained on.
     #[arg(long)]
     still: bool,
     #[command(flatten)]
     rate: FrameRateArgument,
     #[command(flatten)]
     scan: ScanTimeArgument,
-    /// Multiply all readings by this, as a sensor does whose gain has drifted: 1.02 is 2 % more.
+    /// Multiply all readings by this factor, like a sensor whose gain has drifted: 1.02 is 2 % more.
     #[arg(long, value_name = "FACTOR", default_value_t = 1.0)]
     scale: f64,
     #[command(flatten)]

@@ -10,8 +10,8 @@ use super::{Common, arguments, print};
 
 /// Compute the paper's Table 1: errors by spread and noise.
 ///
-/// Every definition of error is given. The K-centre network is compared with the training mean, the best
-/// linear decoder, the paper's standard network (K = N), and the 40 cells that the paper prints. -o writes a CSV file with all
+/// Every definition of error is printed. The K-centre network is compared with the training mean, the best linear
+/// decoder, the paper's standard network (K = N), and the 40 cells that the paper prints. -o writes a CSV file with all
 /// outputs, decoders and definitions.
 #[derive(Args)]
 #[command(after_help = "Examples:

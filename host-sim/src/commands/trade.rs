@@ -28,17 +28,17 @@ mod files;
 
 /// Trade speed for accuracy: measure every decoder, and choose the best.
 ///
-/// Trains and judges every number format, K, number of columns read, number of samples averaged, and on contacts
-/// that move filter in time. Marks the Pareto front of error and time from the start of a scan to its
-/// estimate, and chooses the best point within your bounds.
+/// Trains and evaluates every number format, K, number of columns read and number of samples averaged and, for
+/// contacts that move, filters. Marks the Pareto front of error against the time from the start of
+/// a scan to its estimate, and chooses the best point within your bounds.
 ///
 /// Writes trade.csv, trade.json, trade.html and its figures/ to `out/<scene>/` (-o: `DIR/<scene>/`), and with a bound
-/// chosen.bin, all together at the end; those of an earlier trade go. Each point is kept in points/ as soon as it is done: a trade that was stopped
-/// goes on, and another choice among the same points takes seconds.
+/// chosen.bin, all together at the end, and removes those of an earlier trade. Each point is saved in points/ as soon as
+/// it is done: a trade that was stopped continues where it was, and another choice among the same points takes seconds.
 ///
 /// The time of a point is that of its scan, by the plan of the board's firmware for either readout (docs/board.md), and
-/// that of decoding, as predicted (docs/cycles.md). Bounds on time and error that nothing can meet are refused before
-/// anything is trained.
+/// that of decoding, as predicted (docs/cycles.md). Bounds that no point can meet are refused before
+/// training.
 #[derive(Args)]
 #[command(after_help = "Examples:
   taxel trade press
@@ -54,18 +54,18 @@ pub struct Arguments {
     to: arguments::OutputFolder,
     #[command(flatten)]
     tried: DecoderArguments,
-    /// Columns of a scene to read, to try: every, every 2nd and so on. Fewer make the scan shorter [default: 1,2,3,6
-    /// with --frame-rate or --max-latency-ms, else 1].
+    /// Column steps to try: 1 reads every column of the scene, 2 every second one, and so on. Fewer columns make the scan
+    /// shorter [default: 1,2,3,6 with --frame-rate or --max-latency-ms, else 1].
     #[arg(long, value_name = "STEP", value_delimiter = ',')]
     column_step: Vec<usize>,
     /// Choose the cheapest point with an RMSE of at most this, in the group's unit.
     #[arg(long, value_name = "RMSE")]
     max_error: Option<f64>,
-    /// Choose within so many cycles a frame, at zero wait. Unless --max-error is given,
-    /// the most accurate point within all bounds is chosen (of errors that test frames do not tell apart, the cheapest).
+    /// Choose among points that take at most so many cycles a frame, at zero wait. Unless --max-error is given, the most
+    /// accurate point within all bounds is chosen (the cheapest of those whose errors do not differ significantly).
     #[arg(long, value_name = "CYCLES")]
     max_cycles: Option<u64>,
-    /// Choose within a blob of so many bytes [default, with another bound: a slot's 131072].
+    /// Choose among points whose blob has at most so many bytes [default, with another bound: 131072, the size of a slot].
     #[arg(long, value_name = "BYTES")]
     max_flash: Option<usize>,
     /// Choose among points that scan and decode at least so many frames a second.
@@ -76,7 +76,8 @@ pub struct Arguments {
     clock_mhz: f64,
     #[command(flatten)]
     scan: ScanTimeArgument,
-    /// Determine front and choice by the largest error of the scene's own contacts and those that it was not trained on.
+    /// Determine front and choice by the largest error on the scene's own contacts and on those that the model was not
+    /// trained on.
     #[arg(long)]
     worst_case: bool,
     /// Print this trade's plan for `sweep`, which computes it in parts on many machines, and compute nothing.

@@ -30,8 +30,8 @@ mod choice;
 
 /// Train a model on a scene or a CSV file, and write its blob.
 ///
-/// A CSV file trains one network for all selected columns, as a scene does for all rows. If the columns have the project's own
-/// names (r4c17_ohm, r4e2_dz_mm), --each-row trains one for each row-wire.
+/// A CSV file trains one network for all selected columns, as a scene does for all rows. If the columns have the
+/// project's own names (r4c17_ohm, r4e2_dz_mm), --each-row trains one for each row-wire.
 #[derive(Args)]
 #[command(after_help = "Examples:
   taxel train press -o press.bin
@@ -46,8 +46,8 @@ pub struct Arguments {
     source: String,
     #[command(flatten)]
     to: arguments::OutputFile,
-    /// Choose K, spread and penalty among the candidates by cross-validation, and print every score. Best values at
-    /// an edge of default spreads and penalties are looked beyond; other edges are named.
+    /// Choose K, spread and penalty among the candidates by cross-validation, and print every score. If the best spread
+    /// or penalty is the smallest or largest default, more are tried beyond it; for given candidates, a note says so.
     #[arg(long)]
     select: bool,
     #[command(flatten)]

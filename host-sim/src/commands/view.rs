@@ -34,12 +34,12 @@ const SIMULATED_RATE: f64 = 100.0;
 
 /// Watch a sensor in the browser, live: a device, a simulation, or a recording.
 ///
-/// The page is served to this computer alone, at 127.0.0.1, and asks nothing of any other. It shows the sheet and the readings with
-/// fixed scales, the contact over time, what is wrong, and how old the picture is. It zeroes, pauses, records and takes
-/// screenshots. docs/live.md has more.
+/// The page is served to this computer only, at 127.0.0.1, and loads nothing from elsewhere. It shows the sheet and the
+/// readings on fixed scales, the contact over time, faults, and the age of the picture. It can zero, pause, record and
+/// take screenshots. docs/live.md has more.
 #[derive(Args)]
-#[command(mut_arg("model", |it| it.help("Weight blob. It names what a device decodes, and decodes what nobody has decoded; a \
-                                         scene without one trains its own")))]
+#[command(mut_arg("model", |it| it.help("Weight blob: it names the outputs of a device, and decodes frames that are not decoded \
+                                         yet; without one, a model is trained on a scene")))]
 #[command(after_help = "Examples:
   taxel view                          # the device that is plugged in, or else a simulation
   taxel view /dev/ttyACM0 --model press.bin
@@ -47,8 +47,8 @@ const SIMULATED_RATE: f64 = 100.0;
   taxel view mat.csv --model mat.bin
   taxel view /dev/ttyUSB0 --protocol csv --model mat.bin")]
 pub struct Arguments {
-    /// A serial port, a scene (press, contact, moving, or a scene file), a recording (.mcap), or a data file of readings [default:
-    /// the only port of USB, or else the scene press].
+    /// A serial port, a scene (press, contact, moving, or a scene file), a recording (.mcap), or a data file of readings
+    /// [default: the only USB port, or else the scene press].
     source: Option<String>,
     #[command(flatten)]
     of: ModelArgument,
@@ -59,8 +59,8 @@ pub struct Arguments {
     /// Port of the page [default: a free one].
     #[arg(long, value_name = "PORT", default_value_t = 0, hide_default_value = true)]
     http_port: u16,
-    /// Token in the page's address, of 16 letters and digits or more: with --http-port, an open page finds the next view
-    /// [default: a new one each time].
+    /// Token in the page's address, of 16 letters and digits or more: with --http-port, an open page reconnects to the
+    /// next view [default: a new one each time].
     #[arg(long, value_name = "TOKEN")]
     token: Option<String>,
     /// Open no browser: print the page's address alone.

@@ -31,9 +31,9 @@ const RETRY: Duration = Duration::from_secs(1);
 pub enum Protocol {
     /// Taxel's link (docs/link.md).
     Taxel,
-    /// FlexiTac's firmware: 0xAA 0x55, then a byte a reading.
+    /// FlexiTac's firmware: 0xAA 0x55, then one byte per reading.
     Flexitac,
-    /// A line of numbers a scan, between commas, semicolons, tabs or blanks.
+    /// A line of numbers for each scan, separated by commas, semicolons, tabs or blanks.
     Csv,
 }
 

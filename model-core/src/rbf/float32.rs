@@ -1,4 +1,4 @@
-//! The network in f32: exact, at any width.
+//! The network in f32: exact, for any width.
 //!
 //! F(x) = Σ_k ω_k·exp(−d_k·‖x − c_k‖²) + b (+ A·x), with d = 1/(2σ²) and x the readings scaled to
 //! [0, 1]. ‖x − c‖² accumulates in four interleaved partial sums, added pairwise.

@@ -29,7 +29,7 @@ impl Format {
     const fn declaration(self) -> Declaration {
         match self {
             Self::F32 => {
-                Declaration { name: "f32", tag: 1, description: "f32: exact, at any width" }
+                Declaration { name: "f32", tag: 1, description: "f32: exact, for any width" }
             }
             Self::Fixed16 => Declaration {
                 name: "fixed16",

@@ -17,8 +17,8 @@ use super::settings::constants_lines;
 pub struct Arguments {
     /// TOML file of constants that were measured by hand.
     ///
-    /// Keys: reference_v, drive_v, row_source_ohm, feedback_ohm, series_ohm; the last three are one number, or one a
-    /// row or column. What is left out stays as it is.
+    /// Keys: reference_v, drive_v, row_source_ohm, feedback_ohm, series_ohm; the last three are one number, or one
+    /// for each row or column. What is left out stays unchanged.
     file: PathBuf,
 }
 

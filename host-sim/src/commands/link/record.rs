@@ -29,12 +29,12 @@ use super::scan::{
 
 #[derive(Args)]
 pub struct RecordArguments {
-    /// Weight blob that is active on the device: its estimates are saved. Without it, readings are.
+    /// Weight blob that is active on the device: its estimates are saved. Without it, readings are saved.
     pub model: Option<PathBuf>,
-    /// MODEL has been recalibrated since: one of the same columns and scene is active.
+    /// Accept that MODEL was recalibrated since: a model of the same columns and scene is active.
     #[arg(long, requires = "model")]
     recalibrated: bool,
-    /// Save the readings that MODEL takes, not its estimates.
+    /// Save the readings that MODEL uses, not its estimates.
     #[arg(long, requires = "model")]
     pub readings: bool,
     #[command(flatten)]
@@ -51,7 +51,7 @@ pub struct RecordArguments {
 }
 
 #[derive(Args)]
-#[command(mut_arg("model", |it| it.help("Weight blob of the device: its readings are saved, by the names that it has for them")))]
+#[command(mut_arg("model", |it| it.help("Weight blob of the device: its readings are saved under their names in the blob")))]
 pub struct BaselineArguments {
     #[command(flatten)]
     scan: ScanArguments,

@@ -58,10 +58,10 @@ pub struct ReportArguments {
     /// Whether a model with a tracker (train --track) follows the contact [default: on].
     #[arg(long, value_name = "on|off", value_parser = BoolishValueParser::new(), hide_possible_values = true)]
     pub track: Option<bool>,
-    /// Scans of which one is reported, with its estimate and its faults; all are decoded and filtered.
+    /// Report one of so many scans, with its estimate and its faults; all scans are decoded and filtered.
     #[arg(long, value_name = "N", value_parser = value_parser!(u16).range(1..))]
     pub report_every: Option<u16>,
-    /// What is computed and sent of the model's confidence with each estimate: columns NAME_deviation for each output, and
+    /// Confidence that is computed and sent with each estimate: columns NAME_deviation for each output, and
     /// novelty_nats (docs/reading-model.md).
     #[arg(long, value_enum, value_name = "WHAT")]
     pub confidence: Option<Confidence>,
@@ -96,7 +96,7 @@ impl Wanted {
 /// Part of a model's confidence that a device is to send with each estimate.
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum, Serialize)]
 pub enum Confidence {
-    /// Nothing, and nothing is computed.
+    /// No confidence.
     Nothing,
     /// The frame's novelty.
     Novelty,

@@ -60,7 +60,7 @@ impl ConfigureArguments {
 
 #[derive(Args)]
 pub struct SettingsArguments {
-    /// Setting to be forgotten: the next restart activates the image's.
+    /// Setting to erase: the next restart uses the image's own.
     #[arg(long, value_enum, value_name = "SETTING")]
     forget: Option<Forget>,
 }
