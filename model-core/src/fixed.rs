@@ -155,7 +155,7 @@ impl<N: Infer, const ROWS: usize, const INPUTS: usize, const OUTPUTS: usize, con
         novelty.ok().flatten().unwrap_or(f32::NAN)
     }
 
-    /// Replaces missing readings by those expected of the others, as [`Decoder::fill`](crate::Decoder::fill) does, and
+    /// Replaces missing readings by those expected from the others, as [`Decoder::fill`](crate::Decoder::fill) does, and
     /// returns their number.
     #[inline(always)]
     pub fn fill(

@@ -71,7 +71,7 @@ pub fn apart<T: Send + 'static>(
         Some(Ok(value)) => Ok(value),
         Some(Err(panic)) if panic.is::<Stopped>() => Err(PyRuntimeError::new_err("stopped")),
         _ => Err(PyRuntimeError::new_err(
-            "a defect of taxel: its work ended by a panic; please report what you called",
+            "an error in taxel: its work ended by a panic; please report what you called",
         )),
     }
 }

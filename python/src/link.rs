@@ -148,7 +148,7 @@ impl Line {
         };
         let (listener, opened) = Listener::start(buffer, open).map_err(|error| refused(&error))?;
         let Some(opened) = wait(py, listener.stop(), opened)? else {
-            return Err(PyRuntimeError::new_err("a defect of taxel: the listener ended"));
+            return Err(PyRuntimeError::new_err("an error in taxel: the listener ended"));
         };
         let (identity, shape) = opened.map_err(|error| refused(&error))?;
         Ok(Self { listener, identity, shape })

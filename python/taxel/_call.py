@@ -35,7 +35,7 @@ WORDS = (
     (re.compile(r"(?<![\w-])--([a-z]+(?:-[a-z]+)*)"), lambda found: found[1].replace("-", "_")),
 )
 #: Remarks on what Python does by itself.
-OWN = re.compile(r"lines are few for|drift is not looked for|^note: the best \w+, |is the \w+ that was tried")
+OWN = re.compile(r"lines are few for|drift is not checked|^note: the best \w+, |is the \w+ that was tried")
 
 
 class TaxelWarning(UserWarning):

@@ -71,9 +71,9 @@ class Link:
         if protocol not in ("taxel", "flexitac", "csv", "recording"):
             raise ValueError(f'protocol={protocol!r}: give "taxel", "flexitac", "csv" or "recording"')
         if protocol in ("flexitac", "csv") and (shape is None or min(shape) < 1):
-            raise ValueError(f"shape={shape}: protocol {protocol!r} does not tell rows and columns; give such as shape=(16, 32)")
+            raise ValueError(f"shape={shape}: protocol {protocol!r} does not report rows and columns; give them, such as shape=(16, 32)")
         if buffer < 1 or (baud is not None and baud < 1):
-            raise ValueError(f"buffer={buffer}, baud={baud}: give whole numbers from 1 on")
+            raise ValueError(f"buffer={buffer}, baud={baud}: give whole numbers, 1 or above")
         usual_baud = 2_000_000 if protocol == "flexitac" else 921_600
         self._options = (protocol, baud or usual_baud, shape or (0, 0), period_us, send, confidence, buffer)
         self._line: Any = Replay(self.port, send) if protocol == "recording" else _native.Line(self.port, *self._options)
@@ -192,5 +192,5 @@ def only_port() -> str:
     if port is None:
         ports = list_ports()
         known = f"there are {', '.join(ports)}" if ports else "this computer has no serial port"
-        raise ValueError(f"port: no device is found by itself: name its port; {known}")
+        raise ValueError(f"port: no device was found: name its port; {known}")
     return port

@@ -33,7 +33,7 @@ except ImportError:  # scikit-learn is optional
         def set_params(self, **params: Any) -> BaseEstimator:
             for name, value in params.items():
                 if name not in self.get_params():
-                    raise ValueError(f"{name!r} is no parameter of {type(self).__name__}")
+                    raise ValueError(f"{name!r} is not a parameter of {type(self).__name__}")
                 setattr(self, name, value)
             return self
 
@@ -164,7 +164,7 @@ class Model(MultiOutputMixin, RegressorMixin, BaseEstimator):
         names_x, names_y = names_of(X, "X"), names_of(y, "y")
         X, y = self._checked(X, y)
         if len(X) < 2:
-            raise ValueError("n_samples = 1: training takes two lines or more, and many more to be of use")
+            raise ValueError("n_samples = 1: training needs at least two lines, and many more to be useful")
         lines, folds = two_dimensional(y, "y"), groups
         if folds is not None:
             if len(groups) != len(lines):
@@ -176,7 +176,7 @@ class Model(MultiOutputMixin, RegressorMixin, BaseEstimator):
             folds = np.arange(len(X)) * 5 // len(X) if folds is None else folds
             X, lines, folds = (np.repeat(it, counts, axis=0) for it in (X, lines, folds))
             if len(X) < 2:
-                raise ValueError("sample_weight leaves less than two lines")
+                raise ValueError("sample_weight leaves fewer than two lines")
             folds = np.unique(folds, return_inverse=True)[1].astype(float)
         if self.grid is not None:
             grid = "x".join(str(count) for count in self.grid)
@@ -290,7 +290,7 @@ class Model(MultiOutputMixin, RegressorMixin, BaseEstimator):
             return outputs
         assessed = self.blob_.assess(given, rest, self._threads())
         if assessed is None:
-            raise ValueError("the model tells no deviations: train it with reading_model='full'")
+            raise ValueError("the model estimates no deviations: train it with reading_model='full'")
         std, novelty = assessed
         std = std[:, 0] if self._one_output else std
         return (outputs, *([std] if return_std else []), *([novelty] if return_novelty else []))
@@ -386,7 +386,7 @@ class Model(MultiOutputMixin, RegressorMixin, BaseEstimator):
             except ValueError as error:
                 if "Input X contains NaN" not in str(error):
                     raise
-                raise ValueError("Input X contains NaN: missing readings take Model(reading_model='fill')") from None
+                raise ValueError("Input X contains NaN: missing readings need Model(reading_model='fill')") from None
         if y is None and not hasattr(self, "report_"):
             return matrix(X, self.blob_.input_names)
         X = two_dimensional(X, "X")
@@ -422,9 +422,9 @@ class Model(MultiOutputMixin, RegressorMixin, BaseEstimator):
             if value is None or (name == "random_state" and seeds):
                 continue
             if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < least:
-                raise ValueError(f"{name}={value!r}: give a whole number from {least} on")
+                raise ValueError(f"{name}={value!r}: give a whole number, {least} or above")
         if self.n_jobs is not None and (not isinstance(self.n_jobs, (int, np.integer)) or self.n_jobs == 0):
-            raise ValueError(f"n_jobs={self.n_jobs!r}: give a number of threads, or -1 for one a core")
+            raise ValueError(f"n_jobs={self.n_jobs!r}: give a number of threads, or -1 for one per core")
         if self.format not in (None, "f32", "fixed16"):
             raise ValueError(f'format={self.format!r}: give "f32" or "fixed16"')
         if self.grid is not None and np.shape(self.grid) != (2,):
@@ -468,7 +468,7 @@ def checked_weights(weights: ArrayLike, X: np.ndarray) -> np.ndarray:
         return _check_sample_weight(weights, X, dtype=np.float64, ensure_non_negative=True)
     array = np.asarray(weights, dtype=np.float64)
     if array.shape != (len(X),) or not (array >= 0).all():
-        raise ValueError(f"sample_weight: give {len(X)} numbers from 0 on, one a line")
+        raise ValueError(f"sample_weight: give {len(X)} numbers, 0 or above, one per line")
     return array
 
 

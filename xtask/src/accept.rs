@@ -140,8 +140,7 @@ pub fn run(options: &Options) -> Outcome {
     if record.is_right() {
         Ok(())
     } else {
-        Err("the board does something else than it should: see the lines that begin with FAILED"
-            .into())
+        Err("the board failed a test: see the lines that begin with FAILED".into())
     }
 }
 

@@ -88,9 +88,9 @@ impl Clock {
             Some(at) => {
                 let what =
                     if times[at].is_nan() { "holds no time" } else { "is before the one above" };
-                format!("{name} is not taken for the time: line {} {what}", file.line_number(at))
+                format!("{name} is not used as the time: line {} {what}", file.line_number(at))
             }
-            None => format!("{name} is not taken for the time: it never changes"),
+            None => format!("{name} is not used as the time: it never changes"),
         })
     }
 
@@ -157,9 +157,9 @@ fn wrong(name: &str, times: &[f64], at: usize, line: u64) -> Problem {
         (false, Some(before)) => {
             format!("{} is earlier than {} before it", times[at], times[before])
         }
-        _ => "no time stands there".into(),
+        _ => "the time is missing".into(),
     };
-    let rule = format!("column {name:?}: {why}; mend the line, or name another column (--time)");
+    let rule = format!("column {name:?}: {why}; correct the line, or name another column (--time)");
     Problem::MissingValue { line, rule }
 }
 

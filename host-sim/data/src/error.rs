@@ -135,7 +135,7 @@ pub enum Problem {
     #[error("header: {cause}; save as UTF-8")]
     Header { cause: String },
     /// File that holds bytes which no text has.
-    #[error("it is no text; save the table as CSV")]
+    #[error("it is not text; save the table as CSV")]
     NoText,
     /// What gzip packed, and cannot be unpacked.
     #[error("it cannot be unpacked: {cause}; pack it again with gzip")]
@@ -145,7 +145,7 @@ pub enum Problem {
     UnpackedTooLarge { most_bytes: u64 },
     /// Numbers in which a comma may stand for a point or part thousands.
     #[error(
-        "line {line}: {} may be a fraction or a number above a thousand; state --decimal comma, or write numbers \
+        "line {line}: {} may be a fraction or a number above a thousand; give --decimal comma, or write numbers \
          without thousands separators",
         quoted(field)
     )]
@@ -153,14 +153,14 @@ pub enum Problem {
     /// Number with a point in a file with decimal commas.
     #[error(
         "line {line}: {} has a point, and other numbers have decimal commas; write numbers without thousands \
-         separators, or state --decimal point",
+         separators, or give --decimal point",
         quoted(field)
     )]
     PointAmongCommas { line: u64, field: String },
     /// Commas between fields, and twice as many as the header has.
     #[error(
-        "line {line} has {fields} fields, and the header {columns}: commas seem to be decimal ones; state --decimal \
-         comma for one column, else save with semicolons between fields"
+        "line {line} has {fields} fields, and the header {columns}: commas seem to be decimal commas; give --decimal \
+         comma for a single column, or save with semicolons between fields"
     )]
     CommasForBoth { line: u64, fields: usize, columns: usize },
     /// File without content.
@@ -185,7 +185,7 @@ pub enum Problem {
     #[error("header: column {column} has no usable name {}", quoted(name))]
     UnusableName { column: usize, name: String },
     /// Name that two columns share.
-    #[error("header: column {} stands twice; rename one", quoted(name))]
+    #[error("header: column {} appears twice; rename one", quoted(name))]
     RepeatedName { name: String },
     /// Line that cannot be split into fields.
     #[error("{cause}; check quotes and line ends")]
@@ -194,11 +194,13 @@ pub enum Problem {
         cause: String,
     },
     /// Line with more or fewer fields than the header.
-    #[error("line {line} has {fields} fields; the header names {columns}; mend or remove the line")]
+    #[error(
+        "line {line} has {fields} fields; the header names {columns}; correct or remove the line"
+    )]
     FieldCount { line: u64, fields: usize, columns: usize },
     /// Line with more or fewer fields than the first one, in a file without a header.
     #[error(
-        "line {line} has {fields} fields; the first line has {columns}; mend or remove the line"
+        "line {line} has {fields} fields; the first line has {columns}; correct or remove the line"
     )]
     UnevenLine {
         line: u64,
@@ -208,7 +210,7 @@ pub enum Problem {
     },
     /// More lines that are cut or garbled than are skipped.
     #[error(
-        "{lines} of {of} lines are cut or garbled, and no more than 5 % are skipped; the first: {first}"
+        "{lines} of {of} lines are cut or garbled, and at most 5 % are skipped; the first: {first}"
     )]
     Unreadable { lines: usize, of: usize, first: Box<Problem> },
     /// Field that is not a number.
@@ -219,7 +221,7 @@ pub enum Problem {
         if field.contains(',') && field.contains('.') {
             "write numbers without thousands separators, and times as 2026-11-25 09:59:00"
         } else if field.contains(',') && field.starts_with(|c: char| c.is_ascii_digit() || c == '-') {
-            "state --decimal comma if it is one, or write it without thousands separators"
+            "give --decimal comma if it is one, or write it without thousands separators"
         } else {
             "leave the field empty if the value is missing, or use another column"
         }
@@ -256,7 +258,7 @@ pub enum Problem {
     )]
     AllLeftOut { role: Role, pattern: String },
     /// File without any column of the project's own names, and no pattern given.
-    #[error("no column is named like {pattern}; choose the {}; the file has: {known}", role.name())]
+    #[error("no column has a name like {pattern}; choose the {}; the file has: {known}", role.name())]
     NoUsualNames {
         role: Role,
         /// Pattern of the project's own names.

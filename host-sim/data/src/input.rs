@@ -31,7 +31,8 @@ pub fn open(path: &Path) -> Result<File> {
     if path.is_dir() {
         return Err(Error::file(path, Problem::Folder));
     }
-    let opened = open_in_time(path, OpenOptions::new().read(true), "nobody writes to this pipe");
+    let opened =
+        open_in_time(path, OpenOptions::new().read(true), "no program writes to this pipe");
     opened.map_err(|cause| Error::read(path, cause))
 }
 

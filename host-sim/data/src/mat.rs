@@ -110,8 +110,8 @@ pub fn cell_names(
             Ok((own.iter().enumerate().map(|(cell, own)| mat.name(cell, own)).collect(), None))
         }
         (None, Some(Mat { rows, columns })) => Err(format!(
-            "--grid {rows}x{columns} has {} cells, and {} columns are inputs: choose as many (--inputs); dead cells may be left \
-             out only if names carry the cells' numbers",
+            "--grid {rows}x{columns} has {} cells, and {} columns are inputs: choose the same number (--inputs); dead cells may \
+             be left out only if names contain the cells' numbers",
             rows * columns,
             own.len()
         )),
@@ -125,7 +125,7 @@ fn check_agrees(grid: Grid, names: &[String]) -> Result<(), String> {
     let beside = cells.find(|(_, cell)| !matches!(grid, Grid::Of(mat) if is_in(mat, *cell)));
     beside.map_or(Ok(()), |(name, [row, column])| {
         Err(format!(
-            "--grid {grid}: {name} tells its own wires, row {row} and column {column}: leave --grid out, or rename the inputs"
+            "--grid {grid}: {name} names its own wires, row {row} and column {column}: leave --grid out, or rename the inputs"
         ))
     })
 }

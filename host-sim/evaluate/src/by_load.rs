@@ -46,7 +46,7 @@ impl LoadErrors {
     pub fn range(&self) -> String {
         let unit = columns::unit_of(&self.load);
         match self.to {
-            _ if self.told => "place told".into(),
+            _ if self.told => "position given".into(),
             Some(to) => format!("{} to {to} {unit}", self.from),
             None => format!("all from {} {unit}", self.from),
         }
@@ -146,7 +146,7 @@ mod tests {
         // The faintest touch has no place: it counts as the mean, and then the others have a range of their own.
         let faint = [f64::NAN, 0.05, 9.0, -0.2, 10.0, 0.9];
         let found = by_load(&truth, &faint, None, &measure);
-        assert_eq!((of(&found[3]), found.len()), (("place told".into(), 2, 0.5_f64.sqrt()), 4));
+        assert_eq!((of(&found[3]), found.len()), (("position given".into(), 2, 0.5_f64.sqrt()), 4));
         let other = Table { names: vec!["fx_n".into()], values: vec![1.0].into() };
         let measure = Measure { full_scale: vec![1.0], ..measure };
         assert!(by_load(&other, &[1.0], None, &measure).is_empty());

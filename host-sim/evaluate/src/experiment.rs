@@ -130,8 +130,8 @@ impl Experiment {
         if !names_a_scene(name_or_path) {
             let known = crate::scenes::ALL.map(|(name, _)| name).join(", ");
             return Err(Error::Usage(format!(
-                "{name_or_path} is a data file by its name, and a scene is wanted here: {known}, or a scene file (.toml). Measured data \
-                 tells neither the sensor nor what may happen to it; `train`, `run` and `trade` take it"
+                "{name_or_path} has the name of a data file, but a scene is needed here: {known}, or a scene file (.toml). Measured data \
+                 describes neither the sensor nor its contacts; `train`, `run` and `trade` accept it"
             )));
         }
         let text = input::read_text(Path::new(name_or_path)).map_err(|error| match error {
@@ -315,8 +315,8 @@ fn shortened(message: &str) -> String {
         None => line.to_owned(),
     };
     let plain = message
-        .replace("expected usize", "expected a whole number from 0 on")
-        .replace("expected u64", "expected a whole number from 0 on");
+        .replace("expected usize", "expected a whole number, 0 or above")
+        .replace("expected u64", "expected a whole number, 0 or above");
     plain.lines().map(cut).collect::<Vec<_>>().join("\n")
 }
 
@@ -339,7 +339,8 @@ fn check_table1(t: &Table1, noise_kind: NoiseKind) -> Check {
         })?;
         let field = "table1.textbook_covariance";
         require((1e-12..=1e12).contains(&delta), field, format!("{delta:?}"), || {
-            "give a number from 1e-12 to 1e12; the penalty on squared weights is one over it".into()
+            "give a number from 1e-12 to 1e12; the penalty on squared weights is its reciprocal"
+                .into()
         })?;
     }
     let holds = (2..=2000).contains(&t.standard_frames) && t.standard_frames <= t.frames;

@@ -248,13 +248,13 @@ impl Measurements {
         }
         let how = given.over(&self.how)?;
         require(!how.track, "training.track", true, || {
-            "a tracker is of a scene, which says how contacts move: leave it out".into()
+            "a tracker needs a scene, which describes how contacts move: leave it out".into()
         })?;
         require(
             how.relative_inputs == self.training.relative_inputs,
             "training.relative_inputs",
             how.relative_inputs,
-            || "inputs of all points are the same: give it in [set]".into(),
+            || "all points have the same inputs: give it in [set]".into(),
         )?;
         self.how = how;
         Ok(())

@@ -63,7 +63,7 @@ pub struct Errors {
     /// Ratio of the RMSE to the limit, formed on the frames of the [`Reference`]; scenes only.
     pub ratio_to_limit: Option<f64>,
     pub ratio_standard_error: Option<f64>,
-    /// RMSE that the noise of readings at rest makes of the estimates, in the unit; measured data only.
+    /// RMSE that the noise of readings at rest causes in the estimates, in the unit; measured data only.
     pub rmse_of_noise: Option<f64>,
 }
 

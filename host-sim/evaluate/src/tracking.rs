@@ -46,7 +46,7 @@ pub fn add(blob: &ModelBlob, world: &World) -> Result<ModelBlob> {
     let shape = blob.parse().shape();
     let fits = [shape.rows, shape.inputs] == [sizes.rows, sizes.columns];
     if !fits || !sizes.has_outputs(shape.outputs) {
-        let rule = "a tracker is of outputs that are deformations, along z or along x, y and z; leave one of them out";
+        let rule = "a tracker needs outputs that are deformations, along z or along x, y and z; leave one of them out";
         return Err(BadValue::new("training.track", true, rule).into());
     }
     let block = block(world, sizes)?;
@@ -67,7 +67,7 @@ fn span(sensor: &Sensor) -> usize {
 fn block(world: &World, sizes: Sizes) -> Result<Vec<f32>> {
     let sensor = &world.sensor;
     let Some(press) = world.motion.as_press() else {
-        let rule = "a tracker is of one contact, and the scene's deformation has none";
+        let rule = "a tracker follows one contact, and the scene's deformation has none";
         return Err(BadValue::new("training.track", true, rule).into());
     };
     let settings = settings(world, &press);
@@ -275,7 +275,7 @@ mod tests {
     #[test]
     fn a_tracker_needs_a_single_contact_and_deformations() {
         for (name, words) in
-            [("paper", "of one contact"), ("contact", "outputs that are deformations")]
+            [("paper", "follows one contact"), ("contact", "outputs that are deformations")]
         {
             let mut scene = Experiment::load(name).unwrap();
             (scene.frames, scene.training.refine, scene.training.track) = (500, false, true);

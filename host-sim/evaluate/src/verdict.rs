@@ -65,21 +65,23 @@ impl Verdict {
             let within = match below(least) {
                 0 => "it is no better than always predicting the mean".to_owned(),
                 percent => {
-                    format!("at best {percent} % below the error of always predicting the mean")
+                    format!(
+                        "its error is at best {percent} % below that of always predicting the mean"
+                    )
                 }
             };
             let names: Vec<&str> = hardly.iter().map(|group| group.group.as_str()).collect();
             let names = listed(&names);
             sentences.push(if decoded.is_empty() {
-                format!("The model has learnt next to nothing of {names}: {within}.")
+                format!("The model has learnt almost nothing about {names}: {within}.")
             } else {
-                format!("It tells little of {names}: {within}.")
+                format!("It has learnt little about {names}: {within}.")
             });
             sentences.extend(nobody_can(&hardly));
         }
         for (groups, why) in [
             (&constant, "does not change in these frames: there is nothing to decode"),
-            (&missing, "has no frame to judge by"),
+            (&missing, "has no test frame"),
         ] {
             let names: Vec<&str> = groups.iter().map(|group| group.group.as_str()).collect();
             sentences.extend(names.iter().map(|name| format!("{name} {why}.")));
@@ -114,9 +116,9 @@ impl Verdict {
     /// Adds that the frames to judge by are the end of a log, and whether their baseline is `renewed` in each of its pauses.
     #[must_use]
     pub fn at_the_end_of_a_log(mut self, renewed: bool) -> Self {
-        self.sentence += " These are errors at the end of the log, later than all that the model was trained on.";
+        self.sentence += " These are errors at the end of the log, after all lines that the model was trained on.";
         if renewed {
-            self.sentence += " The baseline was renewed in each pause; a device keeps one until it takes another.";
+            self.sentence += " The baseline was renewed in each pause; a device keeps its baseline until it captures another.";
         }
         self
     }
@@ -284,7 +286,7 @@ fn nobody_can(groups: &[&Errors]) -> Option<String> {
     let most = ratios?.into_iter().fold(f64::NEG_INFINITY, f64::max);
     (most < AT_LIMIT).then(|| {
         let more = (100.0 * (1.0 - 1.0 / most)).ceil().max(1.0);
-        format!("The readings hold no more: no decoder could be better by more than {more} %.")
+        format!("No decoder of these readings could be better by more than {more} %.")
     })
 }
 

@@ -39,7 +39,7 @@ impl JudgedOn {
             Self::FreshFrames => "On fresh frames",
             Self::HeldOutFolds => "On folds that were held out",
             Self::TrainingFrames => {
-                "On the frames that it was trained on, which flatters it (`run` holds frames out)"
+                "On its own training frames, where errors look too small (`run` holds frames out)"
             }
         }
     }

@@ -7,7 +7,7 @@ pub use taxel_data::error::{Error, Result};
 /// Error for readings without any regression on which a projection could be based.
 pub(crate) fn no_regression() -> Error {
     Error::failed(
-        "the readings have no regression: some are no numbers, or so large that sums of their squares lose all digits",
+        "the readings cannot be fitted: some are not numbers, or are so large that sums of their squares lose all digits",
     )
 }
 
@@ -19,8 +19,8 @@ pub(crate) fn not_packed(cause: EncodeError) -> Error {
 /// Error for a trained network with a parameter that its format does not hold.
 pub(crate) fn parameter_not_held(format: Format, cause: NetworkError) -> Error {
     Error::unfit(format!(
-        "training ends in numbers that the format {} does not hold ({cause}); bring the columns to a moderate scale, say \
-         by another unit",
+        "training gives numbers that the format {} cannot represent ({cause}); give the columns a moderate scale, for \
+         example by another unit",
         format.name()
     ))
 }

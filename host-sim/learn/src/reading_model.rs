@@ -62,7 +62,7 @@ pub fn check(frames: usize, readings: usize) -> Result<()> {
     let least = FRAMES_A_READING * readings.max(2);
     let rule = || {
         format!(
-            "a reading model takes at least {least}, ten for each reading: give more, or leave it out"
+            "a reading model needs at least {least}, ten for each reading: give more, or leave it out"
         )
     };
     Ok(require(frames >= least, "frames", frames, rule)?)

@@ -82,9 +82,9 @@ pub struct Recalibrated {
 pub fn check(model: &Model<'_>) -> Result<()> {
     let rows = model.shape().rows;
     let fault = if !model.whole_frames() && model.network_count() < rows {
-        "rows share a network, while their channels drift apart: train one with a network for each row"
+        "rows share a network, but their channels drift differently: train a model with a network for each row"
     } else if training_errors(model).iter().all(|error| *error <= 0.0) {
-        "it tells no training errors: `train` writes them"
+        "it has no training errors: `train` writes them"
     } else {
         return Ok(());
     };
@@ -112,7 +112,7 @@ pub fn recalibrate(
     let units = Unit::all(model, readings, outputs);
     if let Some(network) = units.iter().position(|unit| !unit.is_excited()) {
         return Err(Error::failed(format!(
-            "network {} of {} has seen fewer than {FEWEST} presses, or presses that are too alike; press other places",
+            "network {} of {} has fewer than {FEWEST} presses, or presses that are too similar; press other places",
             network + 1,
             units.len()
         )));
@@ -120,7 +120,7 @@ pub fn recalibrate(
     let fits = parallel::map(units.len(), &|unit| units[unit].recalibrate());
     if fits.iter().all(|(shift, _)| shift.is_none()) {
         let reason =
-            "no better model came of the presses; the model is as good, or the presses are wrong";
+            "the presses give no better model; the model is as good, or the presses are wrong";
         return Err(Error::failed(reason));
     }
     let shifted = units.iter().zip(&fits).map(|(unit, (shift, _))| unit.shifted(shift.as_deref()));

@@ -11,14 +11,14 @@ pub enum Refusal {
     NoNoise,
     /// Errors on contacts that move, whose limit nobody asked for.
     #[error(
-        "of contacts that move it takes a second or more a trajectory; ask for it by --limit-frames"
+        "for contacts that move it takes a second or more per trajectory; ask for it with --limit-frames"
     )]
     Moving,
     /// Contacts that move, with something that is not modelled.
-    #[error("of contacts that move, {0} is not modelled")]
+    #[error("for contacts that move, {0} is not modelled")]
     MovingWith(&'static str),
     /// Motion with more latents than the sampler can handle.
-    #[error("{latents} unknowns at once are more than the {most} that the sampler is made for")]
+    #[error("{latents} unknowns at once are more than the {most} that the sampler can handle")]
     TooManyLatents {
         /// Number of latents that are sampled together.
         latents: usize,
@@ -27,7 +27,7 @@ pub enum Refusal {
     },
     /// Frames with a posterior of too few effective samples.
     #[error(
-        "{} of {of}: fewer than {least} effective samples, which do not carry the figure",
+        "{} of {of}: fewer than {least} effective samples, which are too few for a figure",
         numbered(frames)
     )]
     Thin {
@@ -40,7 +40,7 @@ pub enum Refusal {
     },
     /// Posterior means whose own Monte Carlo error is too large a part of their error.
     #[error(
-        "{share_percent:.1} % of the squared error of {group} is the sample's own: the sample does not carry the figure"
+        "{share_percent:.1} % of the squared error of {group} is sampling error: the sample is too small for a figure"
     )]
     MonteCarlo {
         /// Group of outputs.
@@ -51,7 +51,7 @@ pub enum Refusal {
     /// Errors that are larger than the posteriors say: samples that missed a part of the posterior.
     #[error(
         "the errors of {group} and the posteriors' own deviations differ by {standard_errors:.1} standard errors: the \
-         sample does not carry the figure"
+         sample is not reliable enough for a figure"
     )]
     Inconsistent {
         /// Group of outputs.

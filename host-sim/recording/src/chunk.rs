@@ -37,7 +37,7 @@ impl Channels {
             kind::CHANNEL => self.learn_channel(&mut bytes),
             _ => Some(Ok(())),
         };
-        learnt.unwrap_or_else(|| Err(Error::damaged(at, "it is no channel and no schema")))
+        learnt.unwrap_or_else(|| Err(Error::damaged(at, "it is neither a channel nor a schema")))
     }
 
     fn learn_schema(&mut self, bytes: &mut Bytes<'_>) -> Option<()> {
@@ -105,7 +105,7 @@ impl Chunk {
             Some((length, crc, compression, stored, bytes.rest()))
         };
         let (length, crc, compression, stored, data) =
-            read().ok_or_else(|| damaged("it is no chunk"))?;
+            read().ok_or_else(|| damaged("it is not a chunk"))?;
         if !compression.is_empty() {
             return Err(Error::Compressed(compression.chars().take(20).collect()));
         }

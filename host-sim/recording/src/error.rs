@@ -16,10 +16,10 @@ pub enum Error {
     #[error("the recording cannot be written: {0}")]
     Write(io::Error),
     /// Existing file that is no recording, and was not to be replaced.
-    #[error("{} is there, and no recording of Taxel's: choose another name, or remove it first", .0.display())]
+    #[error("{} exists, and is not a recording of Taxel: choose another name, or remove it first", .0.display())]
     NotReplaced(PathBuf),
     /// Recording that somebody is writing.
-    #[error("{} is being recorded: end that first", .0.display())]
+    #[error("{} is being recorded: end that recording first", .0.display())]
     InUse(PathBuf),
     /// Layout or extras that cannot be recorded, and the rule that they break.
     #[error("the recording's layout: {0}")]
@@ -35,7 +35,7 @@ pub enum Error {
         rule: String,
     },
     /// File that is no recording of Taxel's.
-    #[error("the file is no recording of Taxel's: it lacks {0}")]
+    #[error("the file is not a recording of Taxel: it lacks {0}")]
     Foreign(String),
     /// Recording of another version of the format.
     #[error(
@@ -48,7 +48,7 @@ pub enum Error {
         known: &'static str,
     },
     /// Recording whose chunks another tool compressed.
-    #[error("the recording is compressed ({0}): unpack it by `mcap decompress`")]
+    #[error("the recording is compressed ({0}): unpack it with `mcap decompress`")]
     Compressed(String),
     /// Bytes of a file that are not what they should be.
     #[error("the recording is damaged at byte {at}: {what}")]

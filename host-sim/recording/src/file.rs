@@ -160,7 +160,7 @@ impl<S: Read + Seek> Source<S> {
                     at_most(MOST_CHUNK_BYTES, length, "bytes of an index")?;
                     let body = self.read(length)?;
                     let learnt = contents.learn_index(kind, &mut Bytes::record(&body));
-                    learnt.unwrap_or_else(|| Err(Error::damaged(at, "it is no index")))?;
+                    learnt.unwrap_or_else(|| Err(Error::damaged(at, "it is not an index")))?;
                 }
                 _ => {}
             }

@@ -47,7 +47,7 @@ pub fn recover(path: &Path) -> Result<Option<Recovered>> {
         recovered =
             Some(outcome.map_err(|cause| taxel_data::Error::write(path, io::Error::other(cause)))?);
         if recovered.is_some_and(|it| it.frames == 0) {
-            return Err(taxel_data::Error::unfit("no frame in it is whole: it stays as it was"));
+            return Err(taxel_data::Error::unfit("no frame in it is whole: it is left unchanged"));
         }
         Ok(())
     })?;

@@ -48,7 +48,7 @@ impl Reader<File> {
         let file = File::open(path).map_err(Error::Read)?;
         // A pipe has no place to go back to, and a folder no bytes.
         if !file.metadata().map_err(Error::Read)?.is_file() {
-            return Err(Error::Foreign("bytes: it is no file".into()));
+            return Err(Error::Foreign("bytes: it is not a file".into()));
         }
         Self::new(file)
     }

@@ -379,8 +379,8 @@ mod tests {
             version + 1
         );
         for (bytes, says) in [
-            (vec![], "nothing comes from it"),
-            (vec![0x55; 40], "bytes come from it that are no packets: check the speed"),
+            (vec![], "it sends nothing"),
+            (vec![0x55; 40], "it sends bytes that are not packets: check the speed"),
             (packet(&[version + 1, 0, 3]), &other_version),
             (report(), "it sends reports, but no answer in time"),
             (packet(&[version, 0, 120]), "messages that this program does not know"),

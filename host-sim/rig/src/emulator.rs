@@ -37,7 +37,7 @@ impl Options {
     pub fn check(&self) -> Result<()> {
         let image = self.image.display();
         let unfit = |says: String| Err(Error::unfit_for("image", format!("{image}: {says}")));
-        let not_elf = || unfit("it is no ELF file; the application's is `qemu-app`".into());
+        let not_elf = || unfit("it is not an ELF file; the application's is `qemu-app`".into());
         // A named pipe would be waited for.
         if self.image.exists() && !self.image.is_file() {
             return not_elf();

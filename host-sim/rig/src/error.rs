@@ -37,10 +37,10 @@ impl std::fmt::Display for Heard {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
             Self::Nothing => f.write_str(
-                "nothing comes from it: check that it runs this project's firmware, and the speed of its line",
+                "it sends nothing: check that it runs this project's firmware, and the speed of its line",
             ),
             Self::Noise => f.write_str(
-                "bytes come from it that are no packets: check the speed of its line (--baud), and that it runs this \
+                "it sends bytes that are not packets: check the speed of its line (--baud), and that it runs this \
                  project's firmware",
             ),
             Self::Reports => f.write_str(
@@ -68,7 +68,7 @@ pub enum Error {
     #[error("the device closed the line")]
     Closed,
     /// Work that somebody ended.
-    #[error("interrupted; the device returns to the configuration that it keeps")]
+    #[error("interrupted; the device returns to its stored configuration")]
     Interrupted,
     /// Device that does not answer.
     #[error("the device does not answer ({attempts} attempts, {} ms each); {heard}", timeout.as_millis())]
@@ -82,7 +82,7 @@ pub enum Error {
     },
     /// Scan that never ended.
     #[error(
-        "the device gave up a scan that did not end; part of its readout that stalls: {stalled}; `cargo xtask accept` tests \
+        "the device stopped a scan that did not end; part of its readout that stalls: {stalled}; `cargo xtask accept` tests \
          it (docs/board.md)"
     )]
     GivenUp {
@@ -140,7 +140,7 @@ fn configuration_range(field: ConfigurationField) -> String {
             format!("the time between scans (--period-us: 0, or {least} to {most})")
         }
         Field::Settling => format!(
-            "the wait behind a change of rows (--settling-us: 0 to {})",
+            "the wait after a change of rows (--settling-us: 0 to {})",
             ScanSettings::MOST_SETTLING_US
         ),
         Field::Oversampling => format!(
@@ -151,13 +151,13 @@ fn configuration_range(field: ConfigurationField) -> String {
             "a limit of readings (--shorted-below-ohm must be below --open-above-ohm)".into()
         }
         Field::ContactThreshold => {
-            "the change that is a contact (--contact-threshold: above 0)".into()
+            "the change that counts as contact (--contact-threshold: above 0)".into()
         }
         Field::FilterTimeConstant => {
             format!("the filter's time constant (--filter-ms: 0 to {MOST_FILTER_MS})")
         }
         Field::FilterLead => format!("the filter's lead (--lead-ms: 0 to {MOST_FILTER_MS})"),
-        Field::ReportEvery => "the scans of which one is reported (--report-every: from 1)".into(),
+        Field::ReportEvery => "the number of scans per report (--report-every: 1 or above)".into(),
         Field::LoadThreshold => "the load of an event (--load-threshold: 0 or above)".into(),
         Field::Slip => "the speed of a slip (--slip-mm-per-s: 0 or above)".into(),
     }
@@ -170,7 +170,7 @@ fn why(refusal: Refusal) -> String {
         Refusal::Unknown => "it does not know the request".into(),
         Refusal::FrameLength { expected } => format!("a frame of it has {expected} readings"),
         Refusal::Configuration(field) => format!("{} is out of range", configuration_range(field)),
-        Refusal::Baseline => "it scans nothing, or another baseline was asked for".into(),
+        Refusal::Baseline => "it scans nothing, or another baseline was requested".into(),
         Refusal::TooLarge { slot_bytes } => format!("a model may have {slot_bytes} bytes at most"),
         Refusal::NoUpload => "no upload has begun, or no model is on trial".into(),
         Refusal::OutOfPlace { received } => format!("it has {received} bytes of the upload so far"),
@@ -193,7 +193,7 @@ fn why(refusal: Refusal) -> String {
         }
         Refusal::Keep(KeepFault::TooLarge) => "it has no room to keep that".into(),
         Refusal::Keep(KeepFault::TooOften) => {
-            "settings or undos were written too often since its start, which wears its flash; restart it to go on".into()
+            "settings or undos were written too often since its start, which wears its flash; restart it to continue".into()
         }
         Refusal::TooSoon { wait_us } => format!(
             "its flash was erased too often; upload again in {} s",

@@ -43,7 +43,7 @@ pub fn capacity_for(model: &Model<'_>, has: Capacity) -> Result<Capacity, String
         let remedy = if model.whole_frames() { "give fewer inputs or --features" } else { "give fewer inputs" };
         if columns > MOST_COLUMNS || rows > MOST_ROWS {
             format!(
-                "no image scans its {rows} × {columns} wires: {MOST_ROWS} × {MOST_COLUMNS} are the most; choose others with \
+                "no image scans its {rows} × {columns} wires, but at most {MOST_ROWS} × {MOST_COLUMNS}; choose others with \
                  --inputs"
             )
         } else {
@@ -79,7 +79,7 @@ fn wires(model: &Model<'_>, has: Capacity) -> Result<(usize, usize), String> {
     let columns = columns.min_by_key(|columns| columns.abs_diff(shape.inputs / columns));
     columns.map(|columns| ((shape.inputs / columns).max(has.rows), columns)).ok_or_else(|| {
         format!(
-            "{} readings without names of wires fill no rows of {MOST_COLUMNS} or fewer: train with --grid ROWSxCOLUMNS",
+            "{} readings without names of wires cannot be divided into rows of {MOST_COLUMNS} or fewer: train with --grid ROWSxCOLUMNS",
             shape.inputs
         )
     })

@@ -68,10 +68,10 @@ impl TryFrom<OutputsTable> for Outputs {
             (Some(quantity), Some(axes), None) => {
                 Ok(Self::Electrodes(ElectrodeOutputs { quantity, axes }))
             }
-            (_, _, Some(_)) => {
-                Err("`contact` stands alone: leave out `quantity` and `axes`, which \
-                                    are for outputs of electrodes, or leave out `contact`")
-            }
+            (_, _, Some(_)) => Err(
+                "`contact` cannot be combined with others: leave out `quantity` and `axes`, which \
+                                    are for outputs of electrodes, or leave out `contact`",
+            ),
             (None, _, None) => {
                 Err("missing field `quantity` (outputs of electrodes), or `contact` \
                                     (outputs of the contact)")

@@ -138,7 +138,7 @@ impl World {
         rows(self)?;
         self.rubber.check()?;
         require(!self.remembers() || self.path.is_some(), "rubber", "[rubber]", || {
-            "still contacts have been held until nothing creeps any more, so it would change nothing; add [motion], or leave it out".into()
+            "still contacts have been held until the rubber has stopped creeping, so it would change nothing; add [motion], or leave it out".into()
         })?;
         match &self.outputs {
             Outputs::Electrodes(wanted) => outputs_of_electrodes(wanted),
@@ -149,7 +149,7 @@ impl World {
     /// Checks that a contact of this world can move along `path`.
     pub fn check_path(&self, path: &Path) -> Check {
         require(self.motion.largest_contact(&self.sensor).is_some(), "motion", "[motion]", || {
-            "electrodes that move on their own have no contact that could slide; set deformation.kind = \"press\"".into()
+            "electrodes that move independently have no contact that could slide; set deformation.kind = \"press\"".into()
         })?;
         path.check(&self.sensor, self.motion.deepest_mm())?;
         let (steps, seconds) = (path.duration_s / path.fine_step_s(), path.duration_s);
@@ -314,7 +314,7 @@ fn motion(world: &World) -> Check {
         let value = format!("up to {largest} mm along {axis}");
         require(sensor.holds_for(largest), "deformation", value, || {
             format!(
-                "the sensor model holds up to 20 % of the thickness, {most} mm; narrow the range"
+                "the sensor model is valid up to 20 % of the thickness, {most} mm; narrow the range"
             )
         })?;
     }
@@ -361,21 +361,21 @@ fn outputs_of_contact(wanted: &[ContactOutput], world: &World) -> Check {
     })?;
     let largest = world.motion.largest_contact(&world.sensor);
     require(largest.is_some(), "outputs.contact", format!("{names:?}"), || {
-        "electrodes that move on their own have no contact; set deformation.kind = \"press\", or ask for \
+        "electrodes that move independently have no contact; set deformation.kind = \"press\", or ask for \
          outputs.quantity and outputs.axes"
             .into()
     })?;
     let of_load = |it: &ContactOutput| matches!(it, ContactOutput::Centre | ContactOutput::Force);
     let known = !world.remembers() || wanted.iter().all(of_load);
     require(known, "outputs.contact", format!("{names:?}"), || {
-        "how deep the rubber is by now depends on where the contact was before; ask for \"centre\" and \"force\" \
-         alone, or leave [rubber] out"
+        "the depth of the rubber depends on where the contact was before; ask only for \"centre\" and \
+         \"force\", or leave [rubber] out"
             .into()
     })?;
     let is_single = largest.is_some_and(|contact| contact.is_single());
     let holds = is_single || *wanted == [ContactOutput::Force];
     require(holds, "outputs.contact", format!("{names:?}"), || {
-        "two contacts (deformation.kind = \"pair\") have no one centre, depth and shear; ask for \"force\" alone, or for \
+        "two contacts (deformation.kind = \"pair\") have no single centre, depth and shear; ask only for \"force\", or for \
          outputs.quantity and outputs.axes"
             .into()
     })

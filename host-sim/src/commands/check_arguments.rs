@@ -119,8 +119,8 @@ impl CheckArguments {
         let metadata = parsed.metadata();
         if metadata.scene_digest != scene.digest {
             common.remark(format_args!(
-                "note: the model was trained on {:?}, not on this scene; its bits can be compared all \
-                 the same",
+                "note: the model was trained on {:?}, not on this scene; its outputs can be compared \
+                 all the same",
                 metadata.name
             ));
         }
@@ -172,7 +172,7 @@ pub fn conclude(findings: &Findings, common: &Common) -> print::Outcome {
 }
 
 fn sections_of(f: &Findings) -> Sections {
-    let mut result = Sections::new("The device beside the host");
+    let mut result = Sections::new("Device compared with the host");
     device_lines::value(&mut result, &f.device);
     result.value("statistics", &f.statistics);
     result.value("frames", &f.frames);

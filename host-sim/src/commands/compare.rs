@@ -80,7 +80,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<print::Outcome>
     }
     let points = plan.points()?;
     if plan.groups().is_empty() {
-        let message = "the scenes have no output in common, by whose error they could be compared: give others";
+        let message = "the scenes have no common output whose error could be compared: give others";
         return Err(Error::Usage(message.into()));
     }
     let merged = match &arguments.to.output {

@@ -103,8 +103,8 @@ impl DataOptions {
             |field| field.starts_with("fold"),
             |option| {
                 format!(
-                    "{option} has no effect: refinement, `train --select` and --reading-model full take folds, and none is \
-                     asked for; leave it out, or add one of these"
+                    "{option} has no effect: refinement, `train --select` and --reading-model full use folds, and none of \
+                     these is given; leave it out, or add one of them"
                 )
             },
         )
@@ -176,7 +176,7 @@ fn check_level(rest: &Table, inputs: &Table, path: &Path) -> Result<()> {
     if far_from_zero(&rest.means(), &inputs.deviations()) {
         return Ok(());
     }
-    let message = "--relative-inputs: readings are about zero at rest, where R/R₀ means nothing: leave it out, or give readings \
+    let message = "--relative-inputs: readings are about zero at rest, where R/R₀ has no meaning: leave it out, or give readings \
                    from which no baseline was subtracted";
     Err(Error::Unfit { path: path.into(), message: message.into() })
 }

@@ -184,7 +184,7 @@ impl FieldArguments {
         }
         if !file.names_columns {
             common.remark(format_args!(
-                "note: {name} names no columns: they are called c1 to c{} (c2..c5 stands for four of them)",
+                "note: {name} has no column names: columns are called c1 to c{} (c2..c5 selects four of them)",
                 file.header.len()
             ));
         }

@@ -52,7 +52,7 @@ pub fn print_no_rest(outputs: &Table, path: &Path, common: &Common) {
     let why = match told.as_slice() {
         [] => "no output is a force, weight or pressure;".to_owned(),
         names => format!(
-            "in fewer than ten lines {} within 1 % of zero; has it an offset?",
+            "in fewer than ten lines {} within 1 % of zero; does it have an offset?",
             match names {
                 [name] => format!("{name} is"),
                 names => format!("all of {} are", columns::some_names(names)),
@@ -60,7 +60,7 @@ pub fn print_no_rest(outputs: &Table, path: &Path, common: &Common) {
         ),
     };
     common.remark(format_args!(
-        "note: no line of {} is known to be at rest, so drift is not looked for: {why} --rest NAME names a column that is 0 \
+        "note: no line of {} is known to be at rest, so drift is not checked: {why} --rest NAME names a column that is 0 \
          while nothing touches the sensor",
         path.display()
     ));
@@ -124,7 +124,7 @@ fn notes_on_outliers(outliers: &Outliers, name: &str, lines: usize, left_out: &s
     let done = if outliers.left_out {
         format!("left out of {left_out}")
     } else {
-        "used all the same: check them, and mend or remove the lines".into()
+        "used all the same: check them, and correct or remove the lines".into()
     };
     let mut notes =
         vec![format!("note: {count} a value far from all others of its column; {done}:")];
@@ -156,6 +156,6 @@ fn note_on_constant(constant: &[String], name: &str) -> Option<String> {
         count => format!("{count} inputs never change: {}", columns::some_names(constant)),
     };
     Some(format!(
-        "note: {which} in {name}; the model ignores what never changed in training, whatever it does later"
+        "note: {which} in {name}; the model ignores inputs that never changed in training"
     ))
 }

@@ -110,7 +110,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<print::Outcome>
     let has_times = arguments.filter.lead_ms.is_some() || arguments.period.period_ms.is_some();
     let is_series = is_tracked || settings.is_on();
     if has_times && !is_series {
-        let rule = "--lead-ms and --period-ms are of a filter or a tracker, and MODEL has no tracker: give --filter-ms as well";
+        let rule = "--lead-ms and --period-ms are for a filter or a tracker, and MODEL has no tracker: give --filter-ms as well";
         return Err(Error::Usage(rule.into()));
     }
     let estimate = match is_series.then(|| arguments.period.of_file(&file)) {
@@ -129,7 +129,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<print::Outcome>
     let keep = kept(arguments, &file, &estimate)?;
     let assessed = arguments.confidence.then(|| model.assess(&readings.values)).flatten();
     if arguments.confidence && assessed.is_none() {
-        let message = "it tells no confidence: train it with --reading-model full".into();
+        let message = "it estimates no confidence: train it with --reading-model full".into();
         return Err(Error::Unfit { path: arguments.model.clone(), message });
     }
     let novelty = assessed.as_ref().map(|(_, novelty)| &novelty[..]);

@@ -52,7 +52,8 @@ impl SensorArguments {
         };
         let (baud, shape) = (line.baud.unwrap_or(usual_baud), self.shape.or(usual_shape));
         if protocol == Protocol::Taxel && shape.is_some() {
-            let message = "--shape is for --protocol csv or flexitac: a Taxel device tells its own";
+            let message =
+                "--shape is for --protocol csv or flexitac: a Taxel device reports its own";
             return Err(Error::Usage(message.into()));
         }
         Ok(Line { port, baud, protocol, shape, period_us: None })

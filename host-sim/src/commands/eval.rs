@@ -281,9 +281,9 @@ fn made(
     made.line("Trained on", format!("“{}”, {training} frames", metadata.name));
     made.fact("data_file", "Data", "", arguments.data.display().to_string());
     made.fact("frames", "Frames", "", frames);
-    made.fact("frames_evaluated", "Frames that count", "", frames_evaluated);
+    made.fact("frames_evaluated", "Frames evaluated", "", frames_evaluated);
     made.fact("values", "True outputs", "", values);
-    made.fact("values_evaluated", "True outputs that count", "", values_evaluated);
+    made.fact("values_evaluated", "True outputs evaluated", "", values_evaluated);
     made.value("health", health);
     let lines = [
         (without_reading, "lack a reading"),
@@ -299,6 +299,6 @@ fn made(
     ];
     made.line("Faulty readings", report::reasons(&readings));
     let unused = UnusedInputs::among(file, file.columns(metadata.input_names.iter())?);
-    made.line("Inputs that tell nothing", report::in_words(&unused));
+    made.line("Inputs without information", report::in_words(&unused));
     Ok(made)
 }

@@ -52,7 +52,7 @@ impl PeriodArgument {
         if clock.unit != "s" {
             let why = clock.why_counted(file).unwrap_or_else(|| match &clock.column {
                 Some(column) => format!("the unit of {column} is not known"),
-                None => "no column is called as times are".into(),
+                None => "no column has a usual name of times".into(),
             });
             return unfit(format!(
                 "a filter and a tracker need times, and {why}: add a column time_s, or give --period-ms"
@@ -61,7 +61,7 @@ impl PeriodArgument {
         let start_us: Vec<u64> = clock.at.iter().map(|s| (s * 1e6).round() as u64).collect();
         match start_us.windows(2).position(|pair| pair[0] == pair[1]) {
             Some(line) => unfit(format!(
-                "lines {} and {} have the same time, and a filter takes them for one frame: give --period-ms",
+                "lines {} and {} have the same time, and a filter treats them as one frame: give --period-ms",
                 file.line_number(line),
                 file.line_number(line + 1)
             )),

@@ -12,7 +12,7 @@ pub fn note_format(model: &Model<'_>, options: &Options, cycles: u64, common: &C
     let is_other = model.networks().any(|network| network.format() != options.format);
     if options.or_f32 && is_other {
         common.remark(format_args!(
-            "note: {} does not hold this model (--format {0} tells why), so it is in {}: a frame takes {cycles} cycles",
+            "note: the model does not fit {} (--format {0} gives the reason), so it is in {}: a frame takes {cycles} cycles",
             options.format.name(),
             Format::F32.name()
         ));

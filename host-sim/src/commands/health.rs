@@ -109,7 +109,7 @@ impl HealthArguments {
         };
         if lines >= FEWEST_FOR_NOISE && stand_still(&readings.values, readings.names.len()) {
             common.remark(format_args!(
-                "note: all {lines} lines are the same: do the readings stand still?"
+                "note: all {lines} lines are the same: check that the sensor sends new readings"
             ));
         }
         let left_out = self.leave_out(readings)?;
@@ -122,7 +122,7 @@ impl HealthArguments {
         {
             let Limits { shorted_below_ohm, open_above_ohm } = limits;
             common.remark(format_args!(
-                "note: no reading lies within {shorted_below_ohm} to {open_above_ohm} Ω; are they in Ω? --limits gives \
+                "note: no reading lies within {shorted_below_ohm} to {open_above_ohm} Ω; are they in Ω? --limits sets \
                  other limits"
             ));
         }
@@ -149,7 +149,7 @@ impl HealthArguments {
         };
         if health.frames_filled > 0 {
             common.remark(format_args!(
-                "note: missing readings of {} were filled from the others (docs/reliability.md tells what that costs)",
+                "note: missing readings of {} were filled from the others (docs/reliability.md shows what that costs)",
                 of_lines(health.frames_filled, lines)
             ));
         }

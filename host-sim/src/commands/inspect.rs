@@ -165,7 +165,7 @@ fn costs(result: &mut Sections, blob: &ModelBlob, model: &Model<'_>, design: &De
 /// Why the images as they are cannot decode a `model`, with a blob of so many bytes, or not as it was trained.
 fn needs(model: &Model<'_>, design: &Design, bytes: usize) -> Vec<String> {
     let too_large = Warning::larger_than_slot(bytes, design);
-    let too_large = too_large.map(|warning| format!("no device takes it: {}", warning.text));
+    let too_large = too_large.map(|warning| format!("no device can use it: {}", warning.text));
     too_large
         .into_iter()
         .chain(image::needed(model, Capacity::PAPER))

@@ -35,7 +35,7 @@ mod system {
                     // A bar of progress stands on its line.
                     let bar = if std::io::stderr().is_terminal() { "\n" } else { "" };
                     eprintln!(
-                        "{bar}interrupted: nothing is half-written; files are whole, or as they were"
+                        "{bar}interrupted: no file is half-written; each is whole or unchanged"
                     );
                     end();
                 }

@@ -194,8 +194,8 @@ pub fn related<'b>(
         let columns = inputs.names.iter().zip(&lost).filter(|(_, count)| **count > 0);
         let names: Vec<String> = columns.map(|(name, _)| name.clone()).collect();
         common.remark(format_args!(
-            "warning: {} cannot be divided by its baseline in {most} of {} lines: at rest it is zero, negative or missing, as of a \
-             dead cell. Nothing that needs it is decoded there; a model trained without it needs none (--inputs)",
+            "warning: {} cannot be divided by its baseline in {most} of {} lines: at rest it is zero, negative or missing, as for \
+             a dead cell. Outputs that need it are not decoded there; train a model without it (--inputs)",
             columns::some_names(&names),
             inputs.len()
         ));

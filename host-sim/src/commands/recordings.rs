@@ -38,15 +38,14 @@ pub fn open(path: &Path, common: &Common) -> Result<Reader> {
             let (frames, bytes) =
                 mended.map_or((0, 0), |mended| (mended.frames, mended.bytes_left_out));
             common.remark(format_args!(
-                "note: {name} had no end, since whoever wrote it was killed: mended, with {frames} frames; {bytes} bytes of \
-                 parts that are cut or damaged are left out"
+                "note: {name} had no end, because the program that wrote it was killed: repaired, with {frames} frames; \
+                 {bytes} bytes of cut or damaged parts are left out"
             ));
             Reader::open(path).map_err(error)
         }
         Err(cause) => {
-            common.remark(format_args!(
-                "note: {name} has no end, and is read as far as it is whole: {cause}"
-            ));
+            common
+                .remark(format_args!("note: {name} has no end, and is read up to there: {cause}"));
             Ok(reader)
         }
     }
@@ -90,7 +89,7 @@ pub fn read(path: &Path, common: &Common) -> Result<DataFile> {
         header.extend(layout.outputs.iter().map(|column| column.name.clone()));
     } else if !layout.outputs.is_empty() {
         common.remark(format_args!(
-            "note: {} holds no true outputs; its estimates are not taken for these",
+            "note: {} has no true outputs; its estimates are not used as such",
             path.display()
         ));
     }

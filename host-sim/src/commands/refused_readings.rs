@@ -42,13 +42,13 @@ fn notes(readings: &Table, source: &str) -> Vec<String> {
     let mut faults = diagnose(readings, limits, None);
     faults.retain(|found| !matches!(found.fault.place, Place::Reading(..))); // columns have a share of their own
     let first = format!(
-        "note: readings of {source} lie outside of {} to {} Ω: a device, `decode` and `eval` take them for missing:",
+        "note: readings of {source} lie outside of {} to {} Ω: a device, `decode` and `eval` treat them as missing:",
         limits.shorted_below_ohm, limits.open_above_ohm
     );
     let last = [
-        "  if they are sound, give the device other limits (link configure --shorted-below-ohm, --open-above-ohm), and \
+        "  if they are correct, give the device other limits (link configure --shorted-below-ohm, --open-above-ohm), and \
          --limits",
-        "  to `decode` and `eval`; otherwise mend the readings, or choose others",
+        "  to `decode` and `eval`; otherwise correct the readings, or choose others",
     ];
     let named = health::notes(&columns, &faults, readings.len());
     [first].into_iter().chain(named).chain(last.map(String::from)).collect()

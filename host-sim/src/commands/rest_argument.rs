@@ -79,7 +79,7 @@ impl RestArgument {
         if 2 * told > lines.len() {
             file.forget(&lines, &places);
             common.remark(format_args!(
-                "note: on {told} lines of {} nothing touches: the place there ({}) counts as missing (--rest none: it is told)",
+                "note: nothing touches the sensor on {told} lines of {}: the position there ({}) counts as missing (--rest none keeps it)",
                 file.path.display(),
                 names.join(", "),
             ));
@@ -110,7 +110,7 @@ impl RestArgument {
         let lines: Vec<usize> = usual.into_iter().map(|index| lines[index]).collect();
         if lines.is_empty() {
             if self.is_given() {
-                let message = "--rest: no ten lines are within 1 % of zero there; name other columns, or leave it out";
+                let message = "--rest: fewer than ten lines are within 1 % of zero there; name other columns, or leave it out";
                 return Err(unfit(&file.path, message.into()));
             }
             return Ok(None);

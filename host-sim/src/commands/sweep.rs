@@ -194,7 +194,7 @@ fn merge(
     let merged = Merged::read(plan, points, &store)?;
     if merged.points.is_empty() {
         return Err(Error::failed(format!(
-            "{} has no result of this plan by this program, and nothing is written; give the folder that its shards wrote to",
+            "{} has no results of this plan from this program, and nothing is written; give the folder that its shards wrote to",
             folder.display()
         )));
     }
@@ -202,7 +202,7 @@ fn merge(
     if !others.is_empty() {
         let first = others.iter().take(NAMED).map(String::as_str).collect::<Vec<_>>().join(", ");
         common.remark(format_args!(
-            "note: {} in {}, of no point of this plan and program, left out: {first}{}",
+            "note: {} in {}, which belong to no point of this plan and program, are left out: {first}{}",
             counted(others.len(), "file"),
             folder.join("points").display(),
             if others.len() > NAMED { ", …" } else { "" }

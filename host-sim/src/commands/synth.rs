@@ -65,7 +65,7 @@ impl Arguments {
         let path = scene.world.path.as_ref().filter(|_| !self.still && !self.untouched);
         if path.is_none() && (!self.untouched || self.rate.frame_rate.is_none()) {
             if self.rate.frame_rate.is_some() || self.scan.scan_ms.is_some() {
-                let message = "--frame-rate and --scan-ms give frames a time, and still frames have none: take a scene with \
+                let message = "--frame-rate and --scan-ms set times of frames, and still frames have none: use a scene with \
                                [motion], or --untouched with --frame-rate";
                 return Err(Error::Usage(message.into()));
             }

@@ -281,7 +281,7 @@ fn check(subject: &Subject, asked: &Asked) -> std::result::Result<(), BadValue> 
     let has_others = subject.scene().is_some_and(|scene| !scene.others.is_empty());
     if asked.worst_case && !has_others {
         let rule =
-            "there are no other contacts to judge by; leave it out, or give a scene of contacts";
+            "there are no other contacts to evaluate; leave it out, or give a scene of contacts";
         return Err(BadValue::new("--worst-case", true, rule));
     }
     Ok(())

@@ -120,7 +120,7 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<print::Outcome>
             let blob = if let Some(blob) = blob {
                 blob
             } else {
-                common.remark("training a small model; --model takes a better one …");
+                common.remark("training a small model; give a better one with --model …");
                 simulation::small_model(&scene)?
             };
             let rate = arguments.rate.frame_rate.unwrap_or(SIMULATED_RATE);
@@ -143,11 +143,11 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<print::Outcome>
             let clock = Clock::of(&file, arguments.clock.time.as_deref())?;
             let has_no_unit = clock.column.as_ref().filter(|_| clock.unit.is_empty());
             let why = has_no_unit.map(|name| {
-                format!("the unit of {name} is not known (a name such as {name}_ms tells it)")
+                format!("the unit of {name} is not known (a name such as {name}_ms gives it)")
             });
             if let Some(why) = why.or_else(|| clock.why_counted(&file)) {
                 common.remark(format_args!(
-                    "note: {why}; frames follow one another {USUAL_RATE} times a second, or by --frame-rate"
+                    "note: {why}; {USUAL_RATE} frames a second are shown (--frame-rate)"
                 ));
             }
             let mut feed =

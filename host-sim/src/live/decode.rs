@@ -46,7 +46,7 @@ impl<'b> FrameByFrame<'b> {
     pub fn note(&self) -> Option<String> {
         let lacks = self.reciprocals.as_ref().is_some_and(|all| all.iter().all(|it| it.is_nan()));
         let words =
-            "nothing is decoded yet: the model divides by the untouched sensor; zero it (b)";
+            "nothing is decoded yet: the model needs a baseline of the untouched sensor; zero it (b)";
         lacks.then(|| words.into())
     }
 

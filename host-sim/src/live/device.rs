@@ -102,7 +102,8 @@ impl<'b> DeviceFeed<'b> {
         let blob = self.blob.map(|blob| blob.bytes().to_vec());
         let open = move |stop: &Arc<AtomicBool>| open(&line, inputs, blob, stop);
         let (listener, opened) = Listener::start(BUFFER, open)?;
-        let opened = opened.recv().map_err(|_| Error::failed("a defect: no listener"))??;
+        let opened =
+            opened.recv().map_err(|_| Error::failed("an error in the program: no listener"))??;
         let (layout, device_decodes) = match (&opened, self.blob) {
             (_, Some(blob)) => {
                 let decodes = opened.as_ref().is_some_and(|(_, decodes)| *decodes);
@@ -159,7 +160,7 @@ impl<'b> DeviceFeed<'b> {
         }
         self.drop_line();
         Ok(Next::Trouble(
-            "frames have another shape: was the model exchanged? It is asked again".into(),
+            "frames have another shape: was the model replaced? The device is asked again".into(),
         ))
     }
 
@@ -261,7 +262,7 @@ impl Feed for DeviceFeed<'_> {
                 let silence = self.last.elapsed().as_secs();
                 Ok(Next::Trouble(match listener.refused() {
                     0 => format!(
-                        "no data for {silence} s: is the cable in, and does the device scan?"
+                        "no data for {silence} s: is the cable plugged in, and does the device scan?"
                     ),
                     bytes => format!(
                         "no scan for {silence} s, although {bytes} bytes came: are --protocol, --baud and --shape right?"
@@ -299,7 +300,7 @@ fn advice(line: &Line, cause: &str) -> String {
     let help = if cause.contains("ermission denied") {
         "a line in /etc/udev/rules.d/50-taxel.rules gives you the port: SUBSYSTEM==\"tty\", MODE=\"0666\""
     } else {
-        "is the cable in, and the device powered? It is tried again every second"
+        "is the cable plugged in, and the device powered? The port is tried again every second"
     };
     format!("no data from {}: {cause}; {help}", line.port)
 }

@@ -151,7 +151,7 @@ impl<'b> SimulationFeed<'b> {
 
     /// Takes the next trajectory.
     fn go_on(&mut self) -> Result<()> {
-        let failed = |_| Error::failed("a defect: synthesis has ended");
+        let failed = |_| Error::failed("an error in the program: synthesis has ended");
         (self.current, self.place) = (self.trajectories.recv().map_err(failed)?, 0);
         Ok(())
     }

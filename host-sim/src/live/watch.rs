@@ -130,7 +130,7 @@ impl<'w, 'b> Watch<'w, 'b> {
                 if self.recorder.is_some() {
                     let ended = self.stop_recording().unwrap_or_else(|cause| cause);
                     self.remark = Some(format!(
-                        "the recording has ended, since the sensor sends other frames now: {ended}"
+                        "the recording has ended, because the sensor sends other frames now: {ended}"
                     ));
                 }
                 self.wires = Wires::new(&self.feed.layout().readings);
@@ -184,7 +184,7 @@ impl<'w, 'b> Watch<'w, 'b> {
             return (*state, message.clone());
         }
         let seeks_rest = self.touch.is_none() && self.newest.len() == ZERO_FRAMES;
-        let words = "no rest is known yet, since readings are not steady: let go of the sensor";
+        let words = "the sensor at rest is not known yet, because readings are not steady: let go of the sensor";
         let said = seeks_rest.then(|| words.into()).into_iter();
         let said = said.chain(self.feed.note()).chain(self.remark.clone());
         let said = said.chain((!wires.is_empty()).then(|| {
@@ -285,7 +285,7 @@ impl<'w, 'b> Watch<'w, 'b> {
     fn zero(&mut self) -> std::result::Result<String, String> {
         if self.newest.len() < ZERO_FRAMES {
             return Err(format!(
-                "not zeroed: it takes {ZERO_FRAMES} frames, and there are {}",
+                "not zeroed: {ZERO_FRAMES} frames are needed, and there are {}",
                 self.newest.len()
             ));
         }
@@ -319,7 +319,7 @@ impl<'w, 'b> Watch<'w, 'b> {
 
     fn start_recording(&mut self) -> std::result::Result<String, String> {
         if !self.feed.about().can.record {
-            return Err("a recording is not recorded again".into());
+            return Err("a recording cannot be recorded again".into());
         }
         if self.recorder.is_some() {
             return Err("a recording is being written already".into());

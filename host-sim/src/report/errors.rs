@@ -30,8 +30,8 @@ pub fn density(view: &Pictures<'_>) -> Figure {
     Figure::of_panels(
         "decoded-against-true",
         format!(
-            "Decoded against true outputs of all {} frames. On the line both are the same; a model that has learnt \
-             nothing gives a level band. The fuller a square, the more pairs it holds, on a logarithmic scale.{outside}",
+            "Decoded against true outputs of all {} frames. On the line both are equal; a model that has learnt \
+             nothing gives a horizontal band. A fuller square holds more pairs, on a logarithmic scale.{outside}",
             grouped(view.frames)
         ),
         &panels,
@@ -54,8 +54,8 @@ pub fn histogram(view: &Pictures<'_>) -> Figure {
     Figure::of_panels(
         "sizes-of-errors",
         format!(
-            "How large errors are: share of |decoded − true| in bins of equal width, on a logarithmic scale, over all \
-             outputs and frames. Dashed: the median, and what 95 % of the errors do not exceed.{beyond}"
+            "Sizes of errors: share of |decoded − true| in bins of equal width, on a logarithmic scale, over all \
+             outputs and frames. Dashed: the median, and the value that 95 % of the errors do not exceed.{beyond}"
         ),
         &panels,
     )
@@ -77,11 +77,11 @@ pub fn by_electrode(view: &Pictures<'_>, face: &Face) -> Figure {
     let unread = view.sensor.is_some_and(|sensor| sensor.row_wires.iter().any(|row| !row.read));
     let cells = match (face.outline, unread) {
         (Some(_), true) => {
-            "A cell is what is nearer to its electrode than to any other. Blank parts belong to row-wires that are \
+            "A cell is the area nearer to its electrode than to any other. Blank parts belong to row-wires that are \
              not read."
         }
-        (Some(_), false) => "A cell is what is nearer to its electrode than to any other.",
-        (None, _) => "Electrodes are drawn in a grid, since their places are not known.",
+        (Some(_), false) => "A cell is the area nearer to its electrode than to any other.",
+        (None, _) => "Electrodes are drawn in a grid, because their positions are not known.",
     };
     Figure::of_panels(
         "errors-by-electrode",

@@ -166,8 +166,8 @@ pub fn maps(view: &Pictures<'_>, face: &Face) -> Option<Figure> {
     let steps: Vec<Step> = frames.iter().zip(&values).map(step).collect();
     let median = frames.iter().position(|frame| frame.rank.percent() >= 50)?;
     let caption = format!(
-        "Maps of {symbol} in frames of growing error: true and decoded on one scale in all frames, their difference on a \
-         scale with ends at ± the largest value of that one, so that a colour is the same distance from zero on all maps. {ORDER}"
+        "Maps of {symbol} in frames of growing error. True and decoded values share one scale in all frames. The scale \
+         of their difference ends at ± the largest value of the first, so that a colour means the same distance from zero on all maps. {ORDER}"
     );
     let question = "Share of the frames with no larger error";
     Some(Figure::of_steps("frames", caption, question, &steps, median))
@@ -263,11 +263,11 @@ pub fn places(view: &Pictures<'_>) -> Option<Figure> {
     let face_of = if view.sensor.is_some() {
         "Small dots are the upper electrodes."
     } else {
-        "The frame is the range of true places."
+        "The frame is the range of true positions."
     };
     let caption = format!(
-        "Place of the contact, true and decoded, seen from above. A line joins the two. {face_of} A place beyond \
-         the frame is drawn at its edge."
+        "Position of the contact, true and decoded, seen from above. A line joins the two. {face_of} A position \
+         beyond the frame is drawn at its edge."
     );
     (!panels.is_empty()).then(|| Figure::of_panels("places", caption, &panels))
 }

@@ -116,7 +116,7 @@ pub fn sections(judged: &Judged<'_>, made: Sections) -> Sections {
         if let Some(nearest) = table.nearest_formula() {
             let mut beside = Sections::default();
             table1::compare(&mut beside, &table.comparison, nearest);
-            sections.folded("Beside Table 1 of the paper", beside.sections);
+            sections.folded("Compared with Table 1 of the paper", beside.sections);
         }
     }
     sections
@@ -326,9 +326,9 @@ fn moving_contacts(sections: &mut Sections, moving: Option<&MovingContacts>) {
     let baselines = moving.decoders.iter().map(|it| (it.decoder.clone(), None, &it.errors[..]));
     let rows: Vec<Row<'_>> = ways.chain(baselines).collect();
     let caption = format!(
-        "RMSE and R² as a robot meets them, on {}: the newest finished estimate against the truth at that moment, every ms, \
-         read by the board. Age: mean time from the middle of a scan until its estimate is used. × limit: to the least possible \
-         RMSE, from all scans that are finished by then, in no time.",
+        "RMSE and R² as a robot sees them, on {}: every ms, the newest finished estimate of the board is compared with the \
+         truth at that moment. Age: mean time from the middle of a scan until its estimate is used. × limit: ratio to the least \
+         possible RMSE from all scans that are finished by then, without delay.",
         moving.path.in_words()
     );
     let filter = |row: &Row<'_>| row.1.and_then(|way| way.filter);
@@ -421,7 +421,7 @@ fn cost(sections: &mut Sections, device: &DeviceCost) {
         [device.cycles as usize, device.ram_bytes, device.blob_bytes, device.slot_bytes]
             .map(grouped);
     let fits = if device.fits_slot { "fits" } else { "does not fit" };
-    let processor = "a Cortex-M4F whose memory never waits, as docs/cycles.md predicts them";
+    let processor = "a Cortex-M4F with zero wait states, as predicted by docs/cycles.md";
     sections.line("Decoding", format!("{cycles} cycles of {processor}"));
     sections.line("RAM for decoding", format!("{ram} bytes; {weights}"));
     sections.line("Flash", format!("{blob} bytes: the blob {fits} a slot of {slot} bytes"));

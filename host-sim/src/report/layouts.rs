@@ -30,7 +30,7 @@ pub fn sections(merged: &Merged, first: &str) -> Sections {
         more = points::effects(&mut sections, merged);
     }
     sections.folded("The Pareto front of all layouts", front.sections);
-    sections.folded("What the axes do", more);
+    sections.folded("Effects of the axes", more);
     points::counts(&mut sections, merged);
     sections
 }

@@ -151,8 +151,8 @@ fn lines(results: &[LimitResult]) -> Vec<Line<'_>> {
 /// Table of limits, with columns for each group of outputs.
 fn limits<'r>(lines: &'r [Line<'r>]) -> TableOf<'r, Line<'r>> {
     let caption = "Least possible RMSE of any decoder, ± its standard error over the frames: root of the posteriors' mean variance. \
-                   Prior: always predicting the mean. ESS: smallest and median effective sample size of the posteriors. Own error: \
-                   largest share of the squared error that is the sample's own; it is subtracted.";
+                   Prior: always predicting the mean. ESS: smallest and median effective sample size of the posteriors. Sampling \
+                   error: largest share of the squared error that comes from sampling; it is subtracted.";
     let scene = |line: &Line<'r>| line.result.subject.clone();
     let table = TableOf::new(lines, caption);
     let mut table = if lines.iter().all(|line| scene(line) == scene(&lines[0])) {
@@ -196,7 +196,7 @@ fn limits<'r>(lines: &'r [Line<'r>]) -> TableOf<'r, Line<'r>> {
             (text(line), number_value(samples(line).map(|it| it.least)))
         })
         .values("effective_samples_median", |line| number_value(samples(line).map(|it| it.median)))
-        .numbers("monte_carlo_percent", "own error", "%", Digits::Decimals(2), own)
+        .numbers("monte_carlo_percent", "sampling error", "%", Digits::Decimals(2), own)
         .values("refused", |line| line.of.refused.clone().map_or(Value::Null, Value::from))
 }
 

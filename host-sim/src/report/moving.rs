@@ -43,7 +43,7 @@ pub fn trajectory(moving: &MovingContacts) -> Figure {
         "trajectory",
         format!(
             "{name} while a contact slides and presses, every ms: the newest finished estimate, what a filter makes of it, and \
-             the truth. Estimates come in steps, one a frame, and late."
+             the truth. Estimates come in steps, one per frame, and with a delay."
         ),
         &chart,
         [WIDE, NARROW],

@@ -79,8 +79,8 @@ pub fn errors(log: &OverTime) -> Figure {
         "errors-over-time",
         format!(
             "Errors over time, in stretches of equally many lines: RMSE as a share of that of always predicting the mean. \
-             An error that rises steadily comes from a sensor that changes, a single peak from presses that training \
-             lacks.{dashed}{more}"
+             A steady rise comes from a sensor that changes, a single peak from presses unlike those of \
+             training.{dashed}{more}"
         ),
         &chart,
         [WIDE, NARROW],

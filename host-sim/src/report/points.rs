@@ -269,7 +269,7 @@ pub fn sections(merged: &Merged, stem: &str) -> Sections {
     picture(&mut sections, merged, &[]);
     front_table(&mut sections, merged);
     if !merged.effects.is_empty() {
-        sections.heading("What the axes do");
+        sections.heading("Effects of the axes");
         let effects = effects(&mut sections, merged);
         sections.sections.extend(effects);
     }
@@ -305,7 +305,7 @@ pub fn counts(sections: &mut Sections, merged: &Merged) {
     }
     if let Some(more) = notes.len().checked_sub(NOTES).filter(|more| *more > 0) {
         sections
-            .note(format!("{more} more remarks on points stand in the CSV file and in the JSON."));
+            .note(format!("{more} more remarks on points are in the CSV file and in the JSON."));
     }
 }
 
@@ -337,7 +337,7 @@ pub fn effects(sections: &mut Sections, merged: &Merged) -> Vec<Section> {
     sections.rows("effects", table);
     let drawings = [WIDE, NARROW].map(|size| bars(merged, size[0]));
     let caption = "Share of the variance of each result that the levels of an axis explain, whatever the other axes are: of \
-                   its logarithm where all values are positive. What is left belongs to axes together, and to chance.";
+                   its logarithm where all values are positive. The rest comes from combinations of axes, and from chance.";
     let data = shares(merged);
     let bars = Section::Figure(Figure::of_drawings("effects", caption.into(), drawings, data));
     let levels = Section::Folded("Means by level".into(), vec![levels(sections, merged)]);

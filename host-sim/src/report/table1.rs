@@ -126,7 +126,7 @@ pub fn compare(sections: &mut Sections, by_formula: &[Comparison], nearest: &Com
     }
     rows.push(("mean".into(), nearest.mean_percent.iter().map(|it| format!("{it:.2}")).collect()));
     let caption = format!(
-        "As the paper prints it, for z. It does not state its formula; nearest is {}: computed / printed, %.",
+        "As printed in the paper, for z. The paper does not state its formula; the nearest is {}: computed / printed, %.",
         nearest.formula
     );
     let mut cells =
@@ -149,7 +149,7 @@ fn nearness(by_formula: &[Comparison]) -> Vec<(&str, Nearness)> {
 }
 
 fn nearness_table<'r>(rows: &'r [(&'r str, Nearness)]) -> TableOf<'r, (&'r str, Nearness)> {
-    let caption = "How near each formula comes. Gap: root of the mean square over all cells, in points. docs/paper.md says what is open.";
+    let caption = "Distance of each formula from the printed cells. Gap: root of the mean square over all cells, in points. docs/paper.md lists open questions.";
     TableOf::new(rows, caption)
         .names("formula", "formula", |(name, _)| (*name).into())
         .numbers("gap", "gap", "", Digits::Decimals(2), |(_, it)| Some(it.gap))

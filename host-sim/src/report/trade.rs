@@ -379,7 +379,7 @@ fn others(sections: &mut Sections, trade: &Trade, shown: Option<&Shown>) {
     let counted = if trade.worst_case {
         "Front and choice count the worst of these and its own."
     } else {
-        "--worst-case chooses by the worst."
+        "--worst-case chooses by the worst error."
     };
     let which = if trade.chosen.is_some() { "chosen" } else { "most accurate" };
     let caption = format!(

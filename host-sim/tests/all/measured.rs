@@ -113,7 +113,7 @@ fn run_needs_frames_to_judge_by() {
     let usual = ["--inputs", "a,b", "--outputs", "y", "--no-refine", "--centres", "8"];
     let fail = |words: &[&str]| folder.fail(&[words, &usual].concat(), 2);
     let none = fail(&["run", "short.csv"]);
-    assert!(none.contains("no frame to judge by"), "{none}");
+    assert!(none.contains("no test frames"), "{none}");
     let other = fail(&["run", "all.csv", "--test", "m.bin"]);
     assert!(other.contains("m.bin"), "{other}");
 }

@@ -102,11 +102,11 @@ fn stdout_as_output_is_a_stream_and_results_go_to_stderr() {
     let output = waiting.unwrap().wait_with_output().unwrap();
     let message = String::from_utf8(output.stderr).unwrap();
     assert_eq!(output.status.code(), Some(2));
-    assert!(message.contains("cannot write fifo: nobody reads this pipe"), "{message}");
+    assert!(message.contains("cannot write fifo: no program reads this pipe"), "{message}");
     let output = unwritten.unwrap().wait_with_output().unwrap();
     let message = String::from_utf8(output.stderr).unwrap();
     assert_eq!(output.status.code(), Some(2));
-    assert!(message.contains("cannot read silent: nobody writes to this pipe"), "{message}");
+    assert!(message.contains("cannot read silent: no program writes to this pipe"), "{message}");
     let reader = Command::new("cat").arg(&fifo).stdout(Stdio::piped()).spawn().unwrap();
     folder.succeed(&[&synth[..], &["fifo"]].concat());
     assert!(reader.wait_with_output().unwrap().stdout.starts_with(b"r4c1_ohm,"));
@@ -123,8 +123,8 @@ fn an_open_file_that_is_read_is_not_written() {
     let decode =
         |input: &str, output: &str| format!("exec \"$0\" decode m.bin {input} -o {output}");
     for (script, says) in [
-        (format!("{} < a.csv", decode("a.csv", "/dev/stdin")), "stdin is read"),
-        (format!("{} < a.csv", decode("m.bin", "/proc/self/fd/0")), "stdin is read"),
+        (format!("{} < a.csv", decode("a.csv", "/dev/stdin")), "stdin cannot be written"),
+        (format!("{} < a.csv", decode("m.bin", "/proc/self/fd/0")), "stdin cannot be written"),
         (format!("exec 3>> a.csv; {}", decode("a.csv", "/dev/fd/3")), "written over a.csv"),
         (format!("exec 3<> a.csv; {}", decode("same.csv", "/dev/fd/3")), "written over same.csv"),
         (format!("{} >> a.csv", decode("a.csv", "-")), "written over a.csv"),

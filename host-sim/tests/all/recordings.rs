@@ -75,7 +75,7 @@ fn a_recording_that_was_cut_is_mended_when_it_is_opened() {
     drop(recorded);
     let (mended, said) = decode("b.csv");
     assert!(said.contains("cut.mcap had no end"), "{said}");
-    assert!(said.contains(&format!("mended, with {frames} frames")), "{said}");
+    assert!(said.contains(&format!("repaired, with {frames} frames")), "{said}");
     let (again, said) = decode("c.csv");
     assert!([mended, again] == [frames; 2] && !said.contains("cut.mcap"), "{said}");
     folder.write("no.mcap", "not a recording");

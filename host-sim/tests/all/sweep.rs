@@ -110,8 +110,8 @@ fn a_file_that_is_no_result_is_refused_by_name_and_replaced() {
     let cut = whole[names[1]][..300].to_vec();
     let foreign = whole[names[3]].clone();
     for (name, bytes, said) in [
-        (names[0], flipped, "its CRC is not that of its content"),
-        (names[1], cut, "its CRC is not that of its content"),
+        (names[0], flipped, "its CRC does not match its content"),
+        (names[1], cut, "its CRC does not match its content"),
         (names[2], foreign, "the result of another point"),
         (names[2], vec![], "not a result of a sweep"),
         (names[2], vec![0xFF, 0xFE], "not text"),
@@ -167,14 +167,14 @@ fn another_plan_does_not_take_old_results() {
     assert!(
         folder
             .fail(&["sweep", "plan.toml", "--merge", "out/tiny"], 1)
-            .contains("no result of this plan")
+            .contains("no results of this plan")
     );
     folder.write("plan.toml", PLAN);
     folder.write("scene.toml", tiny_scene().replace("seed = 1", "seed = 2"));
     assert!(
         folder
             .fail(&["sweep", "plan.toml", "--merge", "out/tiny"], 1)
-            .contains("no result of this plan")
+            .contains("no results of this plan")
     );
 }
 

@@ -340,7 +340,7 @@ fn a_lost_port_is_reopened_and_the_page_says_what_is_wrong() {
     drop(plugged);
     let status = events.next("status", |status| status["state"].as_str() == Some("no data"));
     let said = status["message"].as_str().unwrap();
-    assert!(said.contains("no data from ") && said.contains("is the cable in"), "{said}");
+    assert!(said.contains("no data from ") && said.contains("is the cable plugged in"), "{said}");
     let plugged = plug([b"of another speed"; 2]);
     let is_noise = |status: &Value| status["message"].as_str().unwrap().contains(" bytes came");
     events.next("status", is_noise);

@@ -160,7 +160,7 @@ fn table1_shows_the_papers_cells_beside_its_own() {
     folder.write("ohm.toml", ohm.replace("[0.005, 0.01, 0.05, 0.1]", "[2.0]"));
     for scene in ["press.toml", "ohm.toml"] {
         let page = folder.succeed(&["table1", scene]);
-        assert!(!page.contains("As the paper prints it"), "{scene}: {page}");
+        assert!(!page.contains("As printed in the paper"), "{scene}: {page}");
         assert_eq!(page.contains(" 2 Ω"), scene == "ohm.toml", "{page}");
     }
     let page = folder.succeed(&["table1", "paper.toml", "-o", "t.csv"]);

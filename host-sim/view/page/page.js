@@ -5,7 +5,7 @@ const byId = (id) => document.getElementById(id);
 const address = (path, more = "") => path + location.search + more;
 const MOST_CHARTS = 12;
 const TOKEN = new URLSearchParams(location.search).get("token");
-const GONE = `The program at ${location.host} does not answer. Started again with --http-port ${location.port} --token ${TOKEN}, it is found by this page.`;
+const GONE = `The program at ${location.host} does not answer. Start it again with --http-port ${location.port} --token ${TOKEN}, and this page reconnects.`;
 /** Time in ms without an event after which the server is taken for gone. */
 const SILENCE_MS = 3500;
 /** Longest time in ms that events may be held up on their way. */
@@ -173,7 +173,7 @@ function showStatus() {
     setText("times_limit", digits(status.times_limit));
   }
   press("pause", isPaused);
-  byId("pause").firstElementChild.textContent = isPaused ? "Go on" : "Pause";
+  byId("pause").firstElementChild.textContent = isPaused ? "Resume" : "Pause";
   press("record", !!recording);
   byId("record").firstElementChild.textContent = recording ? "Stop" : "Record";
   setText("recording", recording ? `${recording.file}: ${bytes(recording.bytes)}, ${recording.seconds.toFixed(1)} s` : "");
@@ -403,7 +403,7 @@ function rescale(factor) {
 }
 
 const ACTIONS = {
-  zero: () => layout?.can.zero ? ask({ action: "zero" }) : say("This source has no baseline to take.", true),
+  zero: () => layout?.can.zero ? ask({ action: "zero" }) : say("This source cannot be zeroed.", true),
   pause: () => ask({ action: ["paused", "ended"].includes(status?.state) ? "resume" : "pause" }),
   record: () => layout?.can.record ? ask({ action: status?.recording ? "stop_recording" : "record" }) : say("This source cannot be recorded.", true),
   screenshot: () => saveScreenshot(),

@@ -61,7 +61,7 @@ function drawKey(context, width, height, shape, deviations) {
     context.strokeStyle = context.fillStyle = theme.text;
     arrow(context, x, y + 5, x + bar, y + 5);
     write(context, `${plain(s / 2)} mm`, x, y + 19, { align: "left" });
-    if (width > 560) write(context, "shear: the way it moved", x + bar + 8, y + 5, { align: "left" });
+    if (width > 560) write(context, "shear: direction moved", x + bar + 8, y + 5, { align: "left" });
     x += bar + (width > 560 ? 160 : 40);
   }
   if (deviations && x + 90 < width) {

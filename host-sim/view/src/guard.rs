@@ -27,11 +27,11 @@ pub fn is_token(token: &str) -> bool {
 /// Refuses a request that comes from elsewhere or has another token.
 pub fn check(head: &Head, token: &str) -> Result<(), Refusal> {
     if !is_local(&head.host) {
-        return Err(Refusal::new(403, "this address is for 127.0.0.1 and localhost alone"));
+        return Err(Refusal::new(403, "this address is only for 127.0.0.1 and localhost"));
     }
     let is_foreign = |origin: &str| !origin.strip_prefix("http://").is_some_and(is_local);
     if head.origin.as_deref().is_some_and(is_foreign) {
-        return Err(Refusal::new(403, "a page from elsewhere may not ask"));
+        return Err(Refusal::new(403, "requests from other pages are refused"));
     }
     let given = head.parameter("token").unwrap_or_default();
     if !bool::from(given.as_bytes().ct_eq(token.as_bytes())) {

@@ -108,7 +108,7 @@ impl Head {
             bytes.extend_from_slice(&piece[..count]);
         };
         let text = std::str::from_utf8(&bytes[..end]);
-        let text = text.map_err(|_| Refusal::new(400, "the request is no text"))?;
+        let text = text.map_err(|_| Refusal::new(400, "the request is not text"))?;
         Ok(Self { rest: bytes[end + 4..].to_vec(), ..Self::parse(text)? })
     }
 

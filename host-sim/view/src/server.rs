@@ -208,7 +208,7 @@ impl Server {
     fn ask(&self, action: Action) -> Result<String, String> {
         if self.asking.fetch_add(1, Ordering::Relaxed) >= MOST_COMMANDS {
             self.asking.fetch_sub(1, Ordering::Relaxed);
-            return Err("the program is still busy with what was asked before".into());
+            return Err("the program is still busy with the previous request".into());
         }
         let (command, answer) = Command::new(action);
         let result = match self.commands.try_send(command) {
@@ -218,7 +218,7 @@ impl Server {
                 }
                 RecvTimeoutError::Disconnected => Err("the program did not answer".into()),
             }),
-            Err(_) => Err("the program takes no commands now".into()),
+            Err(_) => Err("the program accepts no commands now".into()),
         };
         self.asking.fetch_sub(1, Ordering::Relaxed);
         result

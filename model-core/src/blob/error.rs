@@ -157,7 +157,7 @@ pub enum EncodeError {
         most: usize,
     },
     /// Networks and what stands before them do not go together: they are not equally many, or inputs or outputs differ.
-    #[error("network {index} does not fit what stands before it")]
+    #[error("network {index} does not fit its front")]
     UnfitFront {
         /// Index of the network, from 0.
         index: usize,
@@ -169,7 +169,7 @@ pub enum EncodeError {
         index: usize,
     },
     /// The outputs of networks that see whole frames do not divide among the rows.
-    #[error("{outputs} outputs do not divide among {rows} rows")]
+    #[error("{outputs} outputs cannot be divided evenly among {rows} rows")]
     UnevenRows {
         /// Number of outputs of all networks.
         outputs: usize,

@@ -81,7 +81,7 @@ fn cause_of(errors: &[f32], columns: usize) -> Option<String> {
             column + 1
         ));
     }
-    Some(format!("r{}c{} is off: its resistor or its joints", row + 1, column + 1))
+    Some(format!("r{}c{} is off: check its resistor and its joints", row + 1, column + 1))
 }
 
 /// Looks at the untouched sensor: readings that are missing, and how much the others scatter.

@@ -108,7 +108,7 @@ fn reader(text: &[u8], has_header: bool) -> csv::Reader<&[u8]> {
 /// What is wrong, in short.
 fn cause_of(error: &::csv::Error) -> String {
     match error.kind() {
-        ::csv::ErrorKind::Utf8 { .. } => "it is no UTF-8 text".into(),
+        ::csv::ErrorKind::Utf8 { .. } => "it is not UTF-8 text".into(),
         _ => error.to_string(),
     }
 }

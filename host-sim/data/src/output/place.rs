@@ -40,7 +40,7 @@ impl Place {
             match real.to_str().unwrap_or_default() {
                 "-" | "/dev/stdout" | "/dev/fd/1" | "/proc/self/fd/1" => return Ok(Self::Stdout),
                 "/dev/stdin" | "/dev/fd/0" | "/proc/self/fd/0" => {
-                    return refused("stdin is read and not written");
+                    return refused("stdin cannot be written to");
                 }
                 // What a shell has open must not be replaced, even if it is a file.
                 "/dev/stderr" => return Ok(Self::Stream(real)),
@@ -69,7 +69,7 @@ impl Place {
             };
             return Ok(Self::File(Target { named: path.into(), real, permissions }));
         }
-        Err(io::Error::other("too many links lead from one to the next"))
+        Err(io::Error::other("too many links in a row"))
     }
 }
 
@@ -77,7 +77,7 @@ impl Place {
 pub fn file(path: &Path) -> Result<Target> {
     match Place::new(path) {
         Ok(Place::File(target)) => Ok(target),
-        Ok(_) => Err(Error::write(path, io::Error::other("it is no file"))),
+        Ok(_) => Err(Error::write(path, io::Error::other("it is not a file"))),
         Err(cause) => Err(Error::write(path, cause)),
     }
 }
@@ -85,7 +85,7 @@ pub fn file(path: &Path) -> Result<Target> {
 /// Opens a stream. What it holds already stays.
 pub fn open_stream(path: &Path) -> io::Result<File> {
     // A file that the caller has open already, as in `3>> log`, is written at its end.
-    input::open_in_time(path, OpenOptions::new().append(true), "nobody reads this pipe")
+    input::open_in_time(path, OpenOptions::new().append(true), "no program reads this pipe")
 }
 
 /// What tells whether two paths lead to the same file; `None` for anything else than a file.

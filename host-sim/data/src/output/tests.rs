@@ -170,7 +170,7 @@ fn links_are_followed_modes_kept_and_read_only_files_refused() {
     fs::remove_file(path("model")).unwrap();
     symlink("/dev/null", path("metrics")).unwrap();
     let refused = SET.check(folder.path(), &[]).unwrap_err().to_string();
-    assert!(refused.contains("it is no file"), "{refused}");
+    assert!(refused.contains("it is not a file"), "{refused}");
 }
 
 #[test]

@@ -81,7 +81,8 @@ pub(super) fn check(others: &[OtherContact], world: &World) -> Result<(), BadVal
     })?;
     let has_contact = others.is_empty() || world.motion.as_press().is_some();
     require(has_contact, "others", "[[others]]", || {
-        "electrodes that move on their own have no contact that others could differ from; leave it out".into()
+        "electrodes that move independently have no contact to compare others with; leave it out"
+            .into()
     })?;
     for (number, other) in (1..).zip(others) {
         let field = |name: &str| format!("others ({number}).{name}");

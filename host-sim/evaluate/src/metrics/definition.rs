@@ -41,7 +41,7 @@ impl Definition {
             "of noise",
             "",
             None,
-            "RMSE that the noise of readings at rest makes of the estimates, in the output’s unit",
+            "RMSE that the noise of readings at rest causes in the estimates, in the output’s unit",
             |it| it.rmse_of_noise,
         ),
         Self::new("r_squared", "R²", "", Some(3), "1 − Σe²/Σ(Δ − mean Δ)²", |it| {
@@ -52,7 +52,7 @@ impl Definition {
             "%FS",
             "",
             Some(2),
-            "mean|e|/full scale, in per cent of what the scene allows or a measured column spans",
+            "mean|e|/full scale, in per cent of the range that the scene allows or a measured column spans",
             |it| it.full_scale_percent,
         ),
         Self::new("relative_l2_percent", "relative L2", "%", Some(2), "‖e‖/‖Δ‖", |it| {

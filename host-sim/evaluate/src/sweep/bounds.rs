@@ -22,7 +22,7 @@ pub enum Bound {
 
 /// Bound as it stands in a plan: a number is the most.
 #[derive(Deserialize)]
-#[serde(untagged, expecting = "give the most, such as 10, or { least = 10 }")]
+#[serde(untagged, expecting = "give a maximum, such as 10, or { least = 10 }")]
 enum BoundFile {
     Number(f64),
     Named(NamedBound),
@@ -49,7 +49,7 @@ impl TryFrom<BoundFile> for Bound {
             BoundFile::Named(NamedBound { most: None, least: Some(least) }) if !least.is_nan() => {
                 Ok(Self::Least { least })
             }
-            _ => Err("a bound is the most or the least; give one of them, as a number"),
+            _ => Err("a bound is a maximum or a minimum; give one of them, as a number"),
         }
     }
 }

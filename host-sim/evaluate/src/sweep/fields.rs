@@ -30,7 +30,11 @@ fn set_in(outer: &mut Value, path: &str, value: Value) -> Result<(), BadValue> {
             let length = list.len();
             let place = first.parse().ok().filter(|place| *place < length);
             let place: usize = place.ok_or_else(|| {
-                BadValue::new(path, first, format!("give a place in the list, 0 to {}", length - 1))
+                BadValue::new(
+                    path,
+                    first,
+                    format!("give an index of the list, 0 to {}", length - 1),
+                )
             })?;
             match rest {
                 None => list[place] = value,
@@ -38,7 +42,7 @@ fn set_in(outer: &mut Value, path: &str, value: Value) -> Result<(), BadValue> {
             }
             Ok(())
         }
-        other => Err(BadValue::new(path, other, "it is a value and holds no fields")),
+        other => Err(BadValue::new(path, other, "it is a value, which has no fields")),
     }
 }
 
@@ -109,10 +113,10 @@ mod tests {
     #[test]
     fn paths_that_lead_nowhere_are_refused_by_name() {
         for (path, said) in [
-            ("seed.x", "holds no fields"),
+            ("seed.x", "has no fields"),
             ("sensor.size_mm.3", "0 to 2"),
             ("sensor.size_mm.z", "0 to 2"),
-            ("noise.level.0", "holds no fields"),
+            ("noise.level.0", "has no fields"),
         ] {
             let message = set(&mut document(), path, 1.into()).unwrap_err().to_string();
             assert!(message.contains(path) && message.contains(said), "{message}");

@@ -155,7 +155,7 @@ fn caught<T>(stage: impl FnOnce() -> Result<T>) -> Stage<T> {
         Err(panic) => {
             let text = panic.downcast_ref::<String>().map(String::as_str);
             let text = text.or(panic.downcast_ref::<&str>().copied()).unwrap_or("no message");
-            Err(format!("a fault of the program: {text}"))
+            Err(format!("an error in the program: {text}"))
         }
     }
 }

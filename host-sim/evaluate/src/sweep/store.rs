@@ -89,10 +89,10 @@ impl Record {
         let after = text.strip_prefix(START).ok_or_else(foreign)?;
         let (crc, rest) = after.split_once("\",").ok_or_else(foreign)?;
         if u64::from_str_radix(crc, 16) != Ok(digest(rest.as_bytes())) {
-            return Err("it is damaged: its CRC is not that of its content".into());
+            return Err("it is damaged: its CRC does not match its content".into());
         }
         serde_json::from_str(&format!("{{{rest}"))
-            .map_err(|cause| format!("it is no result: {cause}"))
+            .map_err(|cause| format!("it is not a result: {cause}"))
     }
 }
 

@@ -56,7 +56,7 @@ impl Warning {
         Self::when(!groups.is_empty(), "no-gain-over-mean", || {
             let groups = groups.join(", ");
             format!(
-                "{groups}: not surely better than always predicting the mean; do not use these estimates"
+                "{groups}: not significantly better than always predicting the mean; do not use these estimates"
             )
         })
     }
@@ -83,7 +83,7 @@ impl Warning {
         Self::when(frames < FEW_TEST_FRAMES, "few-test-frames", || {
             let plural = if frames == 1 { " is" } else { "s are" };
             format!(
-                "{frames} frame{plural} few to judge by, and the errors may say nothing of others: give \
+                "{frames} test frame{plural} few, and the errors on other frames may differ: give \
                  {FEW_TEST_FRAMES} or more"
             )
         })
@@ -92,7 +92,7 @@ impl Warning {
     /// Model that is judged by the file that it was trained on.
     pub fn trained_on(same_file: bool) -> Option<Self> {
         Self::when(same_file, "judged-by-training-data", || {
-            "the model was trained on these lines, which flatters it: judge it by others".into()
+            "the model was trained on these lines, so its errors look too small: evaluate it on others".into()
         })
     }
 
@@ -119,7 +119,7 @@ impl Warning {
         Self::when(due, "few-frames-for-confidence", || {
             format!(
                 "{frames} training frames are few for a reading model, whose intervals may cover far more or fewer errors \
-                 than they say: give {FRAMES_FOR_CONFIDENCE} or more"
+                 than stated: give {FRAMES_FOR_CONFIDENCE} or more"
             )
         })
     }
@@ -129,7 +129,7 @@ impl Warning {
         Self::when(!worst.is_empty(), "other-contacts", || {
             let more = if more == 0 { String::new() } else { format!(" and {more} more") };
             let advice = if has_novelty {
-                "; train on a mix (docs/scenes.md), and believe no estimate that is novel"
+                "; train on a mix (docs/scenes.md), and do not use estimates of novel frames"
             } else {
                 "; train on a mix (docs/scenes.md), or let a reading model notice them (train --reading-model full)"
             };
@@ -195,8 +195,8 @@ impl Warning {
         let due = samples > 1 && level(samples) > (1.0 - PAYS) * level(samples / 2);
         Self::when(due, "averaging-does-not-pay", || {
             format!(
-                "the mean of {samples} samples has {} of one sample's noise, and of half as many {}: a part of it has a time \
-                 constant of {} ms, and they lie within; average fewer (--average)",
+                "the mean of {samples} samples has {} of the noise of one sample, and the mean of half as many has {}: a part \
+                 of the noise has a time constant of {} ms, which is longer than these samples take; average fewer (--average)",
                 significant(level(samples) / level(1)),
                 significant(level(samples / 2) / level(1)),
                 significant(left(1).time_constant_ms)
@@ -207,7 +207,7 @@ impl Warning {
     /// Folds that were drawn at random from a log.
     pub fn folds_flatter(due: bool) -> Option<Self> {
         Self::when(due, "random-folds-of-a-log", || {
-            "successive lines resemble each other, so that random folds flatter every candidate: leave --folds out for blocks of \
+            "successive lines resemble each other, so errors on random folds look too small: leave --folds out to use blocks of \
              lines, or give --fold-column"
                 .into()
         })

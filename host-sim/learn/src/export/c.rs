@@ -80,7 +80,7 @@ pub fn write(blob: &ModelBlob, name: &Name, limits: Option<Limits>, folder: &Pat
     let is_own = || fs::read_to_string(header).is_ok_and(|text| text.contains(WRITTEN_BY_EXPORT));
     if folder.is_dir() && !is_empty && !is_own() {
         let rule = format!(
-            "it holds other files than a library {} of an earlier export, and some might be replaced; name a new folder",
+            "it has files that are not of library {} from an earlier export, and some might be replaced; give a new folder",
             name.lower()
         );
         return Err(BadValue::new("folder", folder.display(), rule).into());

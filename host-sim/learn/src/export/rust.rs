@@ -217,7 +217,7 @@ fn functions(model: &Model<'_>) -> String {
         (String::new(), "None", "")
     };
     let decode = format!(
-        "\n/// Decodes a frame of readings, row after row. One that is not finite is missing.{doc}\n\
+        "\n/// Decodes a frame of readings, row after row. A reading that is not finite is missing.{doc}\n\
          #[must_use]\n\
          pub fn decode(readings: &{readings}{more}) -> taxel_core::Decoded<{rows}, {outputs}> {{\n\
          \x20   MODEL.decode(readings, {given})\n\
@@ -235,7 +235,7 @@ fn functions(model: &Model<'_>) -> String {
     });
     let fill = model.reading_model().map(|_| {
         format!(
-            "\n/// Replaces missing readings by those expected of the others, and returns their number.{doc}\n\
+            "\n/// Replaces missing readings by those expected from the others, and returns their number.{doc}\n\
              #[allow(dead_code)]\n\
              pub fn fill(readings: &mut {readings}{more}) -> usize {{\n\
              \x20   MODEL.fill(readings, {given})\n\

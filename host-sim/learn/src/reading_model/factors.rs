@@ -36,7 +36,7 @@ impl Factors {
     /// # Errors
     /// [`Error::Unfit`] for readings that are no numbers.
     pub fn fit(readings: &Table, factors: usize) -> Result<Self> {
-        let no_numbers = || Error::unfit("readings are no numbers (reading model)");
+        let no_numbers = || Error::unfit("some readings are not numbers (reading model)");
         let sizes = Sizes { readings: readings.names.len(), factors, components: 0, outputs: 1 };
         let block = fit(readings, factors).ok_or_else(no_numbers)?;
         ReadingModel::new(sizes, &block).map_err(|_| no_numbers())?;

@@ -217,7 +217,7 @@ fn readings_that_are_too_few_or_no_numbers_are_refused_by_name() {
     assert!(check(360, 36).is_ok() && check(20, 1).is_ok() && check(19, 1).is_err());
     let mut bad = model().1.clone();
     bad.values[0] = f64::INFINITY;
-    assert!(says(Statistics::fit(&bad, Extent::Fill, 1).map(drop)).contains("are no numbers"));
+    assert!(says(Statistics::fit(&bad, Extent::Fill, 1).map(drop)).contains("are not numbers"));
 }
 
 #[test]

@@ -26,7 +26,7 @@ pub fn open(port: &str, baud: u32) -> Result<SerialPort> {
     opened.map_err(|cause| {
         let names = names();
         let known = if names.is_empty() {
-            "no serial port is to be seen".to_owned()
+            "no serial port was found".to_owned()
         } else {
             format!("there are {}", names.join(", "))
         };

@@ -85,7 +85,7 @@ impl Motion for Mix {
                 is_contact,
                 field(".kind"),
                 if is_mix { "mix" } else { "independent" },
-                || "a mix is of contacts; give another kind, such as press or punch".into(),
+                || "a mix consists of contacts; give another kind, such as press or punch".into(),
             )?;
             part.deformation.check().map_err(|bad| {
                 let name = field(bad.field.trim_start_matches("deformation"));

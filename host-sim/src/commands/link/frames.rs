@@ -41,10 +41,10 @@ pub fn hear_scans(
         let Some(scan) = next.transpose()? else {
             let why = match scans.len() {
                 0 => "does it scan? `identify` counts its frames",
-                _ => "does the line carry them? Give a longer --period-us",
+                _ => "is the line fast enough? Give a longer --period-us",
             };
             return Err(Error::failed(format!(
-                "{} of {count} frames came, and then none for {:.0} s: {why}",
+                "{} of {count} frames arrived, and then none for {:.0} s: {why}",
                 scans.len(),
                 patience.as_secs_f64()
             )));
@@ -68,7 +68,7 @@ pub fn missing<'v>(values: impl Iterator<Item = &'v f64> + Clone, wanted: Wanted
     }
     let what = if wanted.sent().estimates { "estimate" } else { "reading" };
     Err(Error::failed(format!(
-        "the device sent not a single {what}; `identify` shows failed samples: check the wiring of \
+        "the device sent no {what}; `identify` shows failed samples: check the wiring of \
          converters and rows (docs/board.md)"
     )))
 }

@@ -136,13 +136,13 @@ fn record_presses(
 fn conclude(found: &Recalibrated, given: usize, common: &Common) -> print::Outcome {
     let mut result = Sections::new("Recalibration");
     result.fact("presses", "presses that were used", "", found.presses);
-    result.fact("presses_unusable", "presses that miss a reading", "", given - found.presses);
+    result.fact("presses_unusable", "presses with a missing reading", "", given - found.presses);
     let unit = "× that of training";
     result.fact("error_before", "error of held-out presses before", unit, found.error_before);
     result.fact("error_after", "error of held-out presses after", unit, found.error_after);
     result.value("model_crc", &format!("{:08x}", found.blob.parse().crc()));
     result.lead = format!(
-        "The model is mended: {:08x} is active, also after a restart. `undo` returns to the previous one.",
+        "The model is recalibrated: {:08x} is active, also after a restart. `undo` returns to the previous one.",
         found.blob.parse().crc()
     );
     print::sections(common, &result)

@@ -79,7 +79,7 @@ impl RecordArguments {
         if self.model.is_none() || self.readings {
             let of_estimates = |option: &str| {
                 format!(
-                    "{option} is of estimates, and readings are saved: name the MODEL, without --readings"
+                    "{option} is for estimates, and readings are saved: give MODEL, without --readings"
                 )
             };
             refuse(&self.reports, |_| true, of_estimates)?;
@@ -238,7 +238,7 @@ fn confidence_names(
     }
     if !model.assesses() {
         return Err(Error::Usage(
-            "--confidence: MODEL has none; leave the option out, or train one that has".into(),
+            "--confidence: MODEL has none; leave the option out, or train with --reading-model full".into(),
         ));
     }
     let mut names = Vec::new();
@@ -327,7 +327,7 @@ impl Saved {
             && self.frames_per_s.is_some_and(|rate| rate < MISSED * asked)
         {
             result.warnings.push(format!(
-                "{asked:.1} frames a second were asked for: scanning and decoding take longer than --period-us {period_us}, at \
+                "{asked:.1} frames a second were requested: scanning and decoding take longer than --period-us {period_us}, at \
                  least in every 16th frame"
             ));
         }

@@ -26,7 +26,7 @@ pub fn record(line: Line, action: &RecordArguments, common: &Common) -> Result<p
     let blob = action.model.as_ref().map(|path| ModelBlob::read(path)).transpose()?;
     let mut feed = DeviceFeed::open(line, blob.as_ref().filter(|_| !action.readings))?;
     if feed.note().is_some() {
-        let message = "MODEL divides by the untouched sensor, which only `view` takes: record there, or give --readings";
+        let message = "MODEL needs a baseline of the untouched sensor, which only `view` captures: record there, or give --readings";
         return Err(Error::Usage(message.into()));
     }
     let count = usize::from(action.scan.frames);
@@ -46,17 +46,17 @@ pub fn record(line: Line, action: &RecordArguments, common: &Common) -> Result<p
             }
             Next::Trouble(cause) if last.elapsed() > PATIENCE => {
                 return Err(Error::failed(format!(
-                    "{} of {count} frames came: {cause}",
+                    "{} of {count} frames arrived: {cause}",
                     lines.len()
                 )));
             }
             Next::Anew if !lines.is_empty() => {
-                return Err(Error::failed("lines have another count of numbers now"));
+                return Err(Error::failed("lines now have another number of values"));
             }
             _ => continue,
         };
         if starts_us.last().is_some_and(|last| frame.time_us < *last) {
-            return Err(Error::failed("the line was lost meanwhile"));
+            return Err(Error::failed("the connection was lost meanwhile"));
         }
         if recorder.is_none() && is_recording(&action.to.output) {
             let blob = blob.as_ref().map(|blob| blob.bytes().to_vec());

@@ -174,8 +174,8 @@ pub fn reading_names(identity: &DeviceIdentity, model: Option<&Model<'_>>) -> Re
 pub fn all_wires(identity: &DeviceIdentity) -> Result<Wires> {
     identity.wires().ok_or_else(|| {
         Error::Usage(
-            "the active model takes some of the readings, or in another order: give its file as --model, \
-             or upload one of all readings"
+            "the active model uses only some of the readings, or another order: give its file as --model, \
+             or upload a model of all readings"
                 .into(),
         )
     })
@@ -187,6 +187,6 @@ pub fn check_length(frame: u32, found: usize, expected: usize) -> Result<()> {
         return Ok(());
     }
     Err(Error::failed(format!(
-        "frame {frame} has {found} values instead of {expected}; was the model exchanged meanwhile?"
+        "frame {frame} has {found} values instead of {expected}; was the model replaced meanwhile?"
     )))
 }

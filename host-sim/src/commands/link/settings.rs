@@ -137,7 +137,7 @@ fn show(device: &mut Device, common: &Common) -> Result<print::Outcome> {
     result.line("filtered in time", filter);
     let yes = |sent: bool| if sent { "yes" } else { "no" };
     result.line(
-        "tracked by a model that can",
+        "tracked if the model has a tracker",
         format!("{}, with a lead of {lead_ms} ms", yes(c.track)),
     );
     result.line(

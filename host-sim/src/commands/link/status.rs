@@ -61,7 +61,7 @@ pub fn show(device: &mut Device, common: &Common) -> Result<print::Outcome> {
         result.line(
             "latency",
             format!(
-                "{} µs at most from the start of a scan until the line took its estimate",
+                "{} µs at most from the start of a scan until its estimate was sent",
                 s.longest_latency_us
             ),
         );

@@ -44,7 +44,7 @@ fn chosen(
             ))),
         },
         (Some(count), None) => Err(Error::Usage(format!(
-            "--shards {count}: no scheduler says which one this is ({}); give --shard I/{count}",
+            "--shards {count}: no scheduler gives the number of this one ({}); give --shard I/{count}",
             INDICES.join(", ")
         ))),
         (None, Some((from @ "SLURM_ARRAY_TASK_ID", index))) => {
@@ -54,7 +54,7 @@ fn chosen(
             match whole.and_then(|count| Shard::new(index, count)) {
                 Some(shard) => Ok(Some((shard, Some(from)))),
                 None => Err(Error::Usage(
-                    "this is a task of a Slurm array that is not 1 to N, so it does not tell the number of shards; give \
+                    "this is a task of a Slurm array that is not 1 to N, so the number of shards is unknown; give \
                      --shards N"
                         .into(),
                 )),

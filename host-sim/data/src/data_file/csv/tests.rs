@@ -167,7 +167,7 @@ fn few_lines_that_are_cut_or_garbled_are_skipped_and_counted() {
     }
     let three: [&[u8]; 3] = [b"1\n", b"2\n", b"3,x,pen\n"];
     let refused = DataFile::parse(path, &log_with(&three), &Reading::default()).unwrap_err();
-    let says = "3 of 39 lines are cut or garbled, and no more than 5 % are skipped; the first: line 11 has 1 fields";
+    let says = "3 of 39 lines are cut or garbled, and at most 5 % are skipped; the first: line 11 has 1 fields";
     assert!(refused.to_string().contains(says), "{refused}");
 }
 

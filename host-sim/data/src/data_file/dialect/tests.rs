@@ -39,7 +39,7 @@ fn ambiguous_text_is_refused_with_the_option_that_resolves_it() {
         (thousands, "line 2: \"1,234\" may be a fraction"),
         ("a;b\n\"1,234\";5\n0,5;1.234\n", "line 3: \"1.234\" has a point"),
         ("force\n1,5\n2,5\n", "line 2 has 2 fields, and the header 1: commas seem"),
-        ("a,b\n1,5,2,5\n", "commas seem to be decimal ones"),
+        ("a,b\n1,5,2,5\n", "commas seem to be decimal commas"),
         ("a;b\n1;2\n1;2\n1;2\n1;2\n\"1;2\n", "line 6: a quoted field does not end"),
     ] {
         let refused = refused(text);
@@ -51,7 +51,7 @@ fn ambiguous_text_is_refused_with_the_option_that_resolves_it() {
     let point = Stated { decimal_comma: Some(false), ..Stated::default() };
     let file = read(thousands.as_bytes(), point).unwrap();
     let refused = file.column("a").unwrap_err().to_string();
-    assert!(refused.contains("state --decimal comma") && file.column("b").is_ok(), "{refused}");
+    assert!(refused.contains("give --decimal comma") && file.column("b").is_ok(), "{refused}");
     let stated = Stated { separator: Some(Separator::Char(',')), ..comma() };
     assert_eq!(read(b"a,b\n\"1,5\",\"2\"\n", stated).unwrap().values, [1.5, 2.0]);
 }
@@ -89,7 +89,7 @@ fn a_line_of_units_is_not_a_line_of_text() {
 fn what_is_no_text_is_refused() {
     for bytes in [&b"a,b\n1,\0\n"[..], b"\x93NUMPY\x01\0v\0{'descr': '<f8'}", b"PK\x03\x04\0\0"] {
         let refused = read(bytes, Stated::default()).unwrap_err().to_string();
-        assert!(refused.contains("it is no text; save the table as CSV"), "{refused}");
+        assert!(refused.contains("it is not text; save the table as CSV"), "{refused}");
     }
 }
 

@@ -105,13 +105,14 @@ impl Plan {
     pub(super) fn fold(&self, mut data: Table) -> Checked<Option<usize>> {
         let fold = data.remove("fold");
         if let Some((field, value)) = data.iter().next() {
-            let rule = "points of the same data differ in data.fold alone; give others in [data]";
+            let rule =
+                "points of the same data may differ only in data.fold; give other fields in [data]";
             return Err(BadValue::new(format!("data.{field}"), value, rule));
         }
         let Some(value) = fold else { return Ok(None) };
         let refused = |rule: String| BadValue::new(FOLD, &value, rule);
         let Some(data) = &self.data else {
-            return Err(refused("a scene is judged by fresh frames: leave it out".into()));
+            return Err(refused("a scene is evaluated on new frames: leave it out".into()));
         };
         let fold = value.as_integer().and_then(|fold| usize::try_from(fold).ok());
         let fold = fold.filter(|fold| *fold < data.folds());
@@ -173,13 +174,13 @@ impl Plan {
         let columns = scene.as_ref().map_or(1, |scene| scene.sensor.column_wires);
         require(column_step <= columns, "device.column_step", column_step, || match &self.data {
             Some(_) => {
-                "only a scene has columns to leave out; of a data file, choose inputs".into()
+                "only a scene has columns to leave out; for a data file, choose inputs".into()
             }
             None => format!("give steps from 1 to {columns}, the columns of the scene"),
         })?;
         let moves = scene.is_some_and(|scene| scene.path.is_some());
         require(moves || !filter, "device.filter", filter, || {
-            "a filter is judged on contacts that move: leave it out, or give a scene with a [motion]".into()
+            "a filter is evaluated on contacts that move: leave it out, or give a scene with a [motion]".into()
         })
     }
 

@@ -38,9 +38,9 @@ impl fmt::Display for BadName {
         match self {
             Self::NoIdentifier => write!(
                 f,
-                "a library's name starts with a letter from a to z, and has such letters, digits and _, {LONGEST} at most"
+                "a library's name has letters from a to z, digits and _, at most {LONGEST}, and starts with a letter"
             ),
-            Self::Taken => f.write_str("C, C++ or CMake have this word, or a header of this name; add to it, such as my_NAME"),
+            Self::Taken => f.write_str("it is a word of C, C++ or CMake, or the name of a header; add to it, such as my_NAME"),
         }
     }
 }

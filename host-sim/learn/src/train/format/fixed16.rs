@@ -70,12 +70,12 @@ impl Exponents {
         let bits = EXPONENT_FRACTION_BITS + DECAY_FRACTION_BITS;
         let decay = (exponent_per_step * 2_f64.powi(bits.cast_signed())).round();
         if decay < 1.0 {
-            let rule = "the format fixed16 does not hold so wide a Gaussian; give a smaller spread, or another format \
+            let rule = "the format fixed16 cannot represent so wide a Gaussian; give a smaller spread, or another format \
                         (f32)";
             return Err(BadValue::new("spread", spread, rule).into());
         }
         if decay > f64::from(u32::MAX) {
-            return Err(refused("the format fixed16 does not hold so narrow a Gaussian".into()));
+            return Err(refused("the format fixed16 cannot represent so narrow a Gaussian".into()));
         }
         let scale = CentredScale::new(samples.table);
         let per_step = decay / 2_f64.powi(DECAY_FRACTION_BITS.cast_signed());
@@ -103,7 +103,7 @@ impl Exponents {
                 } else {
                     format!(" (--features {FEW_INPUTS} gives the network fewer inputs)")
                 };
-                refused(format!("exponents of fixed16 end at 64{fewer}"))
+                refused(format!("exponents of fixed16 are at most 64{fewer}"))
             };
             lines.push(b.map_err(too_far)?);
             lines.extend(a.as_chunks::<2>().0.iter().map(|[low, high]| pair(*low, *high)));
@@ -122,7 +122,7 @@ impl Exponents {
         match Network::try_new(shape, false, &this.without_weights) {
             Ok(_) => Ok(this),
             Err(NetworkError::ExponentOutOfRange { .. }) => Err(refused(
-                "a reading could drive an exponent beyond 64, where fixed16 ends".into(),
+                "a reading could drive an exponent beyond 64, the limit of fixed16".into(),
             )),
             Err(cause) => Err(parameter_not_held(Format::Fixed16, cause)),
         }
@@ -291,7 +291,7 @@ fn round(
         }
     }
     Err(Error::unfit(
-        "the format fixed16 does not hold this model: its weights grow without end as they are rounded; give a larger \
+        "the format fixed16 cannot represent this model: its weights grow without bound when they are rounded; give a larger \
          spread, fewer centres, or another format (f32)",
     ))
 }
