@@ -1,7 +1,7 @@
-"""Tactile sensors of conductive rubber: simulate, train, decode, export to C.
+"""Simulate tactile sensors of conductive rubber, train models, decode, and export to C.
 
-Readings are in Ω, lengths in mm, forces in N. Errors of what was given are `ValueError`, with the message of the command
-`taxel`; work that failed is `RuntimeError`.
+Readings are in Ω, lengths in mm, forces in N. Bad arguments raise `ValueError`, with the message of the command `taxel`;
+work that fails raises `RuntimeError`.
 """
 
 from importlib import import_module

@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike
 from taxel import _native
 
 
-#: Folders of files and names of tables of one call, which nobody but this module knows.
+#: Folders of files and names of tables of one call, which only this module knows.
 WORK = re.compile(r"\S*taxel-\w+/|data\.table: ")
 
 
@@ -47,7 +47,7 @@ _given: set[str] = set()
 
 
 def warn(text: str) -> None:
-    """Warns whoever called the module; where that is scikit-learn, which fits many models, once of each kind."""
+    """Warns the caller of the module; scikit-learn, which fits many models, gets each kind of warning once."""
     level, frame = 1, sys._getframe(0)
     while frame.f_back and str(frame.f_globals.get("__name__")).startswith("taxel."):
         level, frame = level + 1, frame.f_back
@@ -60,7 +60,7 @@ def warn(text: str) -> None:
 
 
 def in_python(text: str) -> str:
-    """What a command says, in words of Python."""
+    """Text of a command with options replaced by names of Python."""
     text = WORK.sub("", text)
     for pattern, word in WORDS:
         text = pattern.sub(word, text)
@@ -70,7 +70,7 @@ def in_python(text: str) -> str:
 def call(
     arguments: Sequence[object], *, tables: Sequence[Table] = (), threads: int = 0
 ) -> dict[str, Any]:
-    """Result of a command of `taxel`, as its `--json` has it. Its remarks become warnings."""
+    """Result of a command of `taxel`, as with `--json`. Its remarks become warnings."""
     try:
         text, remarks = _native.call([str(argument) for argument in arguments], list(tables), threads)
     except (ValueError, RuntimeError) as error:
@@ -83,7 +83,7 @@ def call(
 
 
 def option(name: str, value: object) -> list[object]:
-    """An option of a command: none for None and False, alone for True, with commas for several values."""
+    """Option of a command: absent for None and False, without a value for True, with commas between several values."""
     if value is None or value is False:
         return []
     if value is True:
@@ -95,13 +95,13 @@ def option(name: str, value: object) -> list[object]:
 
 @contextmanager
 def folder() -> Iterator[Path]:
-    """A folder for files of one call."""
+    """Folder for the files of one call."""
     with tempfile.TemporaryDirectory(prefix="taxel-") as path:
         yield Path(path)
 
 
 def two_dimensional(values: ArrayLike, what: str) -> np.ndarray:
-    """Numbers as lines of float64, one after the other in memory."""
+    """Numbers as lines of float64, contiguous in memory."""
     array = np.ascontiguousarray(values, dtype=np.float64)
     if array.ndim == 1 and what == "y":
         array = array[:, np.newaxis]
@@ -111,5 +111,5 @@ def two_dimensional(values: ArrayLike, what: str) -> np.ndarray:
 
 
 def table(path: str, columns: dict[str, np.ndarray]) -> Table:
-    """A table that a command reads where `path` is among its arguments."""
+    """Table that a command reads if `path` is among its arguments."""
     return path, list(columns), np.ascontiguousarray(np.column_stack(list(columns.values())), dtype=np.float64)

@@ -1,4 +1,4 @@
-"""Columns of tables, by their names and places."""
+"""Columns of tables, by name and position."""
 
 from __future__ import annotations
 
@@ -32,18 +32,19 @@ def numbered(what: str, count: int) -> list[str]:
 
 
 def pattern(names: Sequence[str]) -> str:
-    """Pattern of a command that chooses columns of these names."""
+    """Pattern that chooses columns of these names in a command."""
     return ",".join(SPECIAL.sub(lambda found: "?" * len(found.group()), name) for name in names)
 
 
 def place(name: str, known: Sequence[str]) -> int | None:
-    """Place of a model's input among the `known` names. A model may call a column after its cell: `r1c2_adc_1` is `adc_1`."""
+    """Index of a model's input among the `known` names. A model may name a column after its cell: `r1c2_adc_1` is
+    `adc_1`."""
     own = name if name in known else name.partition("_")[2]
     return known.index(own) if own in known else None
 
 
 def matrix(values: ArrayLike, inputs: Sequence[str], what: str = "X") -> np.ndarray:
-    """Readings in the order of a model's `inputs`: by the names of a DataFrame, or the columns as they are."""
+    """Readings in the order of a model's `inputs`: a DataFrame by its names, other arrays unchanged."""
     names = names_of(values, what)
     array = np.asarray(values, dtype=np.float64)
     if array.ndim != 2:
@@ -60,7 +61,7 @@ def matrix(values: ArrayLike, inputs: Sequence[str], what: str = "X") -> np.ndar
 
 
 def untouched(baseline: ArrayLike | None, inputs: Sequence[str]) -> np.ndarray:
-    """Readings of the untouched sensor, as a model with relative inputs takes them: the mean of the lines of `baseline`."""
+    """Baseline of a model with relative inputs: the mean of the lines of `baseline`, readings of the untouched sensor."""
     if baseline is None:
         raise ValueError("the model takes R/R₀: give baseline=, readings of the untouched sensor")
     lines = baseline if names_of(baseline, "baseline") and np.ndim(baseline) == 2 else np.atleast_2d(baseline)

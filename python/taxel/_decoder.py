@@ -1,4 +1,4 @@
-"""What a device does with one frame after the other."""
+"""Decoder of single frames, as on a device."""
 
 from __future__ import annotations
 
@@ -21,11 +21,12 @@ STATUS = ("decoded", "missing reading", "overflow", "at rest")
 
 @dataclass(frozen=True)
 class Estimate:
-    """What a frame was decoded to.
+    """Result of decoding a frame.
 
-    `outputs` in the units of the model's outputs, row after row, NaN where a row could not be decoded; `status` a number for
-    each row (`taxel._decoder.STATUS`); `clamped` tells whether a reading lies far outside the training range; `filled` the
-    number of missing readings that were told from the others. `std` and `novelty` are None without a full reading model.
+    `outputs` are in the units of the model's outputs, row after row, NaN for a row that could not be decoded. `status` is a
+    number for each row (`taxel._decoder.STATUS`). `clamped` is whether a reading lies far outside the training range, and
+    `filled` the number of missing readings that were filled from the others. `std` and `novelty` are None without a full
+    reading model.
     """
 
     outputs: np.ndarray
@@ -39,9 +40,10 @@ class Estimate:
 class Decoder:
     """Decodes frames as a device does, bit for bit.
 
-    `blob` is a path, its bytes or a `Model`; `baseline` readings of the untouched sensor in Ω, one line or several, for a
-    model with relative inputs.
-    """
+    `blob` is a path, the bytes of a blob, or a `Model`. `baseline` is needed for a model with relative inputs: readings
+    of the untouched sensor in Ω, one line or several.
+   
+  """
 
     def __init__(self, blob: str | Path | bytes | Model, *, baseline: ArrayLike | None = None):
         if hasattr(blob, "to_bytes"):
@@ -67,7 +69,7 @@ class Decoder:
         return self._blob.output_names
 
     def decode(self, frame: ArrayLike, out: np.ndarray | None = None) -> Estimate:
-        """Decodes one frame of readings, row after row. `out` (float32, as many as outputs) receives the outputs."""
+        """Decodes one frame of readings, row after row. `out` (float32, one for each output) receives the outputs."""
         rows, inputs, outputs = self._sizes
         readings = np.array(frame, np.float32).reshape(-1)
         if readings.size != inputs:
@@ -85,8 +87,8 @@ class Decoder:
         return Estimate(values, status, clamped, filled, std, novelty)
 
     def decode_many(self, frames: ArrayLike, out: np.ndarray | None = None) -> np.ndarray:
-        """Decodes frames (frames × readings, or frames × rows × columns) to outputs (frames × outputs), the same bits as one by
-        one. Columns of a DataFrame are taken by their names."""
+        """Decodes frames (frames × readings, or frames × rows × columns) to outputs (frames × outputs), bit for bit as one
+        by one. Columns of a DataFrame are chosen by name."""
         if np.ndim(frames) > 2:
             frames = np.reshape(frames, (len(frames), -1))  # type: ignore[arg-type]
         values = self._blob.decode(matrix(frames, self._blob.input_names, "frames"), self._baseline)

@@ -21,17 +21,17 @@ CONTACT, CLAMPED, NOVEL = 16, 64, 128
 
 
 def list_ports() -> list[str]:
-    """Serial ports of this computer, those of USB first."""
+    """Serial ports of this computer, USB ports first."""
     return _native.ports()
 
 
 @dataclass(frozen=True)
 class Reading:
-    """What a device sent of one scan.
+    """Data that a device sent for one scan.
 
-    `readings` (rows × columns, Ω) and `outputs` (in the model's units) are empty where they were not asked for; `status` has a
-    number for each row, `flags` those of docs/link.md. `time_us` is when the scan began, since the device's start; `age_ms` how
-    long ago this came; `lost` counts the scans that never came or were not taken.
+    `readings` (rows × columns, Ω) and `outputs` (in the model's units) are empty if they were not requested. `status` has a
+    number for each row; `flags` are those of docs/link.md. `time_us` is the start of the scan since the device's start,
+    `age_ms` the time since the data arrived, and `lost` the number of scans that were lost or not read.
     """
 
     frame: int
@@ -47,12 +47,13 @@ class Reading:
 
 
 class Link:
-    """A device, listened to in the background: an iterator over what it sends, and a context manager.
+    """Connection to a device, read in the background: an iterator over what it sends, and a context manager.
 
-    `port` None takes the one there is. `protocol` "flexitac" and "csv" listen to other sensors: FlexiTac's firmware, and lines of
-    numbers; they need `shape` (rows, columns). "recording" plays the recording (.mcap) that `port` names, again and again. These
-    know neither `zero` nor `upload`. `send` is "readings", "estimates" or "both"; None takes estimates from a device that has a
-    model, and readings from another. `buffer` readings wait to be taken; older ones are dropped and counted.
+    If `port` is None, the only USB port is used. `protocol` "flexitac" and "csv" read other sensors: FlexiTac's firmware,
+    and lines of numbers; they need `shape` (rows, columns). "recording" plays the recording (.mcap) at the path `port` in a
+    loop. These protocols have neither `zero` nor `upload`. `send` is "readings", "estimates" or "both"; None requests
+    estimates from a device that has a model, and readings from others. At most `buffer` readings are kept until they are
+    read; older ones are dropped and counted.
     """
 
     def __init__(
@@ -97,11 +98,11 @@ class Link:
 
     @property
     def model_crc(self) -> int | None:
-        """CRC-32 of the model in force, or None."""
+        """CRC-32 of the active model, or None."""
         return self._opened().identity[2]
 
     def read(self, timeout_ms: float = 2000) -> Reading:
-        """The oldest reading that was not taken yet. `TimeoutError` if none comes."""
+        """The oldest reading that was not read yet. Raises `TimeoutError` if none arrives."""
         found = self._opened().next(timeout_ms / 1000)
         if found is None:
             raise TimeoutError(
@@ -110,8 +111,8 @@ class Link:
         return self._reading(found)
 
     def read_latest(self, max_age_ms: float = 500) -> Reading | None:
-        """The newest reading, and those before it are forgotten; None if it is older than that. The first one is waited for as
-        long."""
+        """The newest reading; older ones are dropped. None if it is older than `max_age_ms`. The first call waits
+        that long for a reading."""
         found = self._opened().newest(max_age_ms)
         if found is None and not self._has_read:
             found = self._opened().next(max_age_ms / 1000)
@@ -129,7 +130,7 @@ class Link:
             return np.loadtxt(rest, delimiter=",", skiprows=1, ndmin=1)
 
     def upload(self, model: Model | str | Path) -> None:
-        """Gives the device a model; if it refuses it, the one before stays."""
+        """Uploads a model to the device; if it is refused, the previous model stays active."""
         with folder() as work:
             path = model
             if hasattr(model, "save"):
@@ -138,8 +139,8 @@ class Link:
             self._apart(["upload", path])
 
     def record(self, path: str | Path, seconds: float, model: Model | str | Path | None = None) -> None:
-        """Records for so many seconds to `path` (.mcap): readings, and estimates by the `model` that is active on the device, if it is
-        given. docs/live.md tells what a recording holds."""
+        """Records for so many seconds to `path` (.mcap): readings, and the estimates if `model`, which must be active on the
+        device, is given. docs/live.md describes recordings."""
         period_us = self._options[3] or 10_000
         frames = max(1, round(seconds * 1e6 / period_us))
         with folder() as work:
@@ -151,7 +152,7 @@ class Link:
             self._apart(["record", *given, "-n", frames, "--period-us", period_us, "-o", path])
 
     def close(self) -> None:
-        """Stops listening: the device returns to its own configuration, and the port is free."""
+        """Stops reading: the device returns to its own configuration, and the port is free."""
         if self._line is not None:
             self._line.close()
             self._line = None
@@ -168,7 +169,7 @@ class Link:
         return self._line
 
     def _apart(self, action: list[object]) -> None:
-        """Lets a command have the port, and listens again."""
+        """Closes the port while a command uses it, and opens it again."""
         if self._options[0] != "taxel":
             raise RuntimeError(f'a sensor of protocol "{self._options[0]}" only sends readings')
         self._opened().close()
@@ -187,7 +188,7 @@ class Link:
 
 
 def only_port() -> str:
-    """The port of USB that there is, if there is one."""
+    """The USB port, if there is exactly one."""
     port = _native.only_usb_port()
     if port is None:
         ports = list_ports()

@@ -24,7 +24,7 @@ except ImportError:  # scikit-learn is optional
     HAS_SKLEARN = False
 
     class BaseEstimator:  # type: ignore[no-redef]
-        """Parameters by their names, as scikit-learn has them."""
+        """Parameters by name, as in scikit-learn."""
 
         def get_params(self, deep: bool = True) -> dict[str, Any]:
             names = inspect.signature(type(self).__init__).parameters
@@ -57,46 +57,48 @@ PENALTIES = (1e-7, 1e-5, 1e-3, 1e-2, 1e-1, 10, 100)
 
 
 class Model(MultiOutputMixin, RegressorMixin, BaseEstimator):
-    """A network of Gaussians, trained by `taxel train` and decoded as a device decodes, to the bit.
+    """A network of Gaussians, trained by `taxel train` and decoded bit for bit as on a device.
 
     Parameters
     ----------
     centres : int or None
-        Largest number of Gaussians K; fewer distinct lines take fewer, with a warning. None for 64, and fewer for few lines;
-        without refinement, folds of up to 1000 lines choose among half as many, as many and twice as many.
+        Largest number of Gaussians K; with fewer distinct lines, K is smaller and a warning is given. None is 64, and fewer
+        for few lines; without refinement and up to 1000 lines, cross-validation chooses among half, once and twice that
+        number.
     spread : float or None
-        Width σ on scaled inputs, where refinement starts. None for 0.4 behind a projection and 0.8 elsewhere; without
-        refinement, for the one with the least error on folds of 100 to 1000 lines.
+        Width σ of the Gaussians on scaled inputs, where refinement starts. None is 0.4 behind a projection and 0.8
+        elsewhere; without refinement and for 100 to 1000 lines, cross-validation chooses it.
     penalty : float or None
-        Ridge penalty on squared weights for each line; None for the one with the least error on folds of up to 1000 lines, and
-        the usual one for more.
+        Ridge penalty on squared weights per line. With None, cross-validation chooses it for up to 1000 lines, and the
+        default of `taxel train` is used for more.
     refine : bool or None
-        Whether centres and widths are refined after K-means: better, and minutes instead of seconds. None for yes, but of
-        up to 1000 lines only where lines held out certainly gain.
+        Whether centres and widths are refined after K-means, which is more accurate and takes minutes instead of seconds.
+        None is True, except for up to 1000 lines without a significant gain on held-out lines.
     select : bool
-        Whether `centres`, `spread`, `penalty` and `refine`, where None, are chosen for any number of lines as for up to 1000.
+        Whether those of `centres`, `spread`, `penalty` and `refine` that are None are chosen for any number of lines as for
+        up to 1000.
     format : {"fixed16", "f32"} or None
-        Number format of the weights; None for fixed16, or f32 where that does not hold the model.
+        Number format of the weights; None is fixed16, or f32 if the model does not fit fixed16.
     each_row : bool
-        A network for each row, instead of one behind a projection of all readings. It is for columns named as wires
-        (`r1c1_ohm`), whose outputs belong to rows.
+        Whether each row has its own network, instead of one network behind a projection of all readings. Columns
+        must be named after wires (`r1c1_ohm`), and outputs must belong to rows.
     features : int or None
-        Features of that projection.
+        Number of features of that projection.
     features_kind : str or None
-        How features are made of readings: "plain", "normalised" or "normalised:K" (docs/training.md); None for those with the
-        least error on lines held out, for places and for amounts.
+        Kind of features: "plain", "normalised" or "normalised:K" (docs/training.md). With None, it is the kind with the
+        smaller error on held-out lines, for positions and for amounts.
     grid : (int, int) or None
-        Rows and columns of a mat whose cells are the columns of X, row by row. Without it, names of a DataFrame may tell a mat
-        (`r1c1`, or numbers that fill a square).
+        Rows and columns of a mat whose cells are the columns of X, row by row. Without it, names of a DataFrame may give the
+        grid (`r1c1`, or numbers that fill a square).
     relative_inputs : bool
-        Inputs are R/R₀. Lines of `fit` at which all outputs are zero are the baseline; `predict` takes one.
+        Whether inputs are R/R₀. In `fit`, lines where all outputs are zero give the baseline; `predict` needs `baseline`.
     reading_model : {"fill", "full"} or None
-        Statistics of the readings: with "fill", missing ones (NaN) are told from the others of their line; with "full",
-        `predict` can tell standard deviations and novelty, too (docs/reading-model.md).
+        Statistics of the readings: with "fill", missing readings (NaN) are estimated from the others of their line; with
+        "full", `predict` can also return standard deviations and novelty (docs/reading-model.md).
     random_state : int, RandomState or None
-        Seed of every random draw, or where to draw it from.
+        Seed of every random draw, or the generator to draw it from.
     n_jobs : int or None
-        Threads, or -1 or None for one a core. Their number changes no bit.
+        Number of threads; -1 or None is one per core. It does not change results.
 
     Attributes
     ----------
@@ -104,10 +106,11 @@ class Model(MultiOutputMixin, RegressorMixin, BaseEstimator):
     feature_names_in_ : array of str, where X had names
     output_names_ : list of str
     report_ : dict
-        What `taxel train --json` says: errors, verdict, warnings, outliers, lines left out.
+        Result of `taxel train --json`: errors, verdict, warnings, outliers, lines left out.
     blob_ : taxel._native.Blob
-        The model as a device has it.
-    """
+        The model as stored on a device.
+   
+  """
 
     def __init__(
         self,
@@ -150,13 +153,14 @@ class Model(MultiOutputMixin, RegressorMixin, BaseEstimator):
         *,
         groups: ArrayLike | None = None,
     ) -> Model:
-        """Trains on readings `X` (lines × features, Ω or whatever they are) and outputs `y` (lines × outputs, or lines).
+        """Trains on readings `X` (lines × features, in Ω or any other unit) and outputs `y` (lines × outputs, or lines).
 
-        `groups` has a number for each line: one group after the other is held out to refine and to tell deviations, instead
-        of five folds. A line of `sample_weight` 2 counts as two lines, and one of 0 as none; weights with fractions are rounded
-        to quarters of their mean. An output may be NaN on some lines, as a place is where nothing touches. Columns of a
-        DataFrame keep their names; an output that is called like a feature gets `_out` behind its name. A value far from all others in its column
-        leaves its line out (`report_["outliers"]`). Missing readings are filled by the others of their line.
+        `groups` has a number for each line: groups are held out in turn for refinement and for deviations, instead of five
+        folds. A line of `sample_weight` 2 counts as two lines, and one of 0 as none; weights with fractions are rounded
+        to quarters of their mean. An output may be NaN on some lines, such as a position while nothing touches the sensor.
+        Columns of a DataFrame keep their names; an output with the name of a feature gets the suffix `_out`. Lines with a
+        value far from all others in its column are left out (`report_["outliers"]`). Missing readings are filled from the
+        others of their line.
         """
         if y is None:
             raise ValueError("fit requires y to be passed, but the target y is None")
@@ -244,7 +248,7 @@ class Model(MultiOutputMixin, RegressorMixin, BaseEstimator):
         return self
 
     def _filled(self, X: np.ndarray, lines: np.ndarray, names_x: list[str], names_y: list[str]) -> np.ndarray:
-        """Readings whose missing ones are told by the whole lines, as a device tells them."""
+        """Readings with missing ones filled by statistics of the complete lines, as on a device."""
         whole = ~np.isnan(X).any(axis=1)
         if whole.sum() < 20:
             return X
@@ -261,7 +265,7 @@ class Model(MultiOutputMixin, RegressorMixin, BaseEstimator):
         return filled
 
     def _threads(self) -> int:
-        """Number of threads; 0 is one a core."""
+        """Number of threads; 0 is one per core."""
         if self.n_jobs is None or self.n_jobs == -1:
             return 0
         return self.n_jobs if self.n_jobs > 0 else max(1, (os.cpu_count() or 1) + 1 + self.n_jobs)
@@ -276,9 +280,9 @@ class Model(MultiOutputMixin, RegressorMixin, BaseEstimator):
     ) -> Any:
         """Outputs for readings `X` (lines × features), in their units: lines × outputs, or lines for one output.
 
-        With `return_std` also their standard deviations, and with `return_novelty` the novelty of each line in nats (above
-        0, it is unlike the lines of training); both need a full `reading_model`. `baseline` are readings of the untouched sensor, one
-        line or several, for a model with relative inputs.
+        `return_std` also returns their standard deviations, and `return_novelty` the novelty of each line in nats (above
+        0, the line is unlike those of training); both need a full `reading_model`. A model with relative inputs needs
+        `baseline`: readings of the untouched sensor, one line or several.
         """
         given, rest = self._checked(X), self._baseline(baseline)
         if hasattr(self, "report_") and self._columns != list(range(given.shape[1])):
@@ -303,9 +307,9 @@ class Model(MultiOutputMixin, RegressorMixin, BaseEstimator):
         *,
         baseline: ArrayLike | None = None,
     ) -> float:
-        """Coefficient of determination R², as a mean over the outputs. An output that is NaN does not count. Estimates of a line
-        that cannot be filled, and of a place where nothing touches, are NaN and count as the mean. An output that never
-        changes has R² 1 if it is met, and else 0."""
+        """Coefficient of determination R², averaged over the outputs. True outputs that are NaN are ignored. Estimates that
+        are NaN, because a line cannot be filled or nothing touches the sensor, count as the mean. An output that never
+        changes has R² 1 if it is predicted exactly, otherwise 0."""
         y, estimate = two_dimensional(y, "y"), two_dimensional(self.predict(X, baseline=baseline), "y")
         weights = np.ones(len(y)) if sample_weight is None else checked_weights(sample_weight, y)
         weights = weights[:, None] * ~np.isnan(y)
@@ -332,8 +336,8 @@ class Model(MultiOutputMixin, RegressorMixin, BaseEstimator):
 
     @classmethod
     def load(cls, path: str | Path) -> Model:
-        """Model of a blob that `save` or `taxel train` wrote. Columns of a DataFrame are taken by the blob's names, in any
-        order and among others. Parameters that a blob does not hold, such as `refine`, are the usual ones."""
+        """Model of a blob that `save` or `taxel train` wrote. Columns of a DataFrame are chosen by the blob's names, in
+        any order. Parameters that a blob does not store, such as `refine`, have their defaults."""
         return cls.of_bytes(Path(path).read_bytes())
 
     @classmethod
@@ -352,7 +356,7 @@ class Model(MultiOutputMixin, RegressorMixin, BaseEstimator):
         return model
 
     def export_c(self, path: str | Path, name: str = "taxel_model") -> None:
-        """Writes a library in C99 that decodes as this model does, to the bit, into the folder `path` (docs/c.md)."""
+        """Writes a C99 library that decodes bit for bit as this model to the folder `path` (docs/c.md)."""
         self._fitted()
         with folder() as work:
             blob = work / "model.bin"
@@ -370,7 +374,7 @@ class Model(MultiOutputMixin, RegressorMixin, BaseEstimator):
             raise ValueError("the model is not trained yet: call fit first, or Model.load")
 
     def _checked(self, X: ArrayLike, y: ArrayLike | None = None) -> Any:
-        """X, and y if it is given, as arrays of float64, after scikit-learn's checks if it is there."""
+        """X, and y if it is given, as arrays of float64, checked by scikit-learn if it is installed."""
         if y is None:
             self._fitted()
         if HAS_SKLEARN and (y is not None or hasattr(self, "report_")):
@@ -415,7 +419,7 @@ class Model(MultiOutputMixin, RegressorMixin, BaseEstimator):
         return untouched(baseline, self.blob_.input_names)
 
     def _check_parameters(self) -> None:
-        """Refuses parameters by their own names; others are told by the command."""
+        """Refuses bad parameters by name; the command checks the others."""
         seeds = self.random_state is None or hasattr(self.random_state, "randint")
         for name, least in (("centres", 1), ("random_state", 0)):
             value = getattr(self, name)
@@ -458,7 +462,7 @@ class Model(MultiOutputMixin, RegressorMixin, BaseEstimator):
 
 
 def seed_of(random_state: Any) -> int:
-    """Seed for `random_state`, as scikit-learn has it."""
+    """Seed for `random_state`, as in scikit-learn."""
     drawn_from = np.random if random_state is None else random_state
     return int(drawn_from.randint(2**31 - 1)) if hasattr(drawn_from, "randint") else int(random_state)
 
@@ -473,14 +477,14 @@ def checked_weights(weights: ArrayLike, X: np.ndarray) -> np.ndarray:
 
 
 def line_counts(weights: np.ndarray) -> np.ndarray:
-    """How often each line is taken for its weight: as often as it says, if all are whole numbers."""
+    """Number of copies of each line for its weight: the weight itself, if all weights are whole numbers."""
     if (weights == np.round(weights)).all():
         return (weights / max(np.gcd.reduce(weights.astype(int)), 1)).astype(int)
     return np.ceil(4 * weights / weights.mean() - 0.5).astype(int)
 
 
 def bars(decoders: list[dict[str, Any]]) -> str:
-    """Errors of the decoders, of the last group of outputs, as bars."""
+    """Bar chart of the decoders' errors for the last group of outputs."""
     errors = [(of["decoder"], of["errors"][-1]) for of in decoders]
     most = max((error["rmse"] for _, error in errors), default=0.0) or 1.0
     unit = escape(errors[0][1].get("unit") or "") if errors else ""

@@ -15,8 +15,8 @@ from taxel._scene import Frames
 class Recording(Frames):
     """Frames of a recording, which `taxel view` and `taxel link record` write.
 
-    `outputs` are the true ones, and has no column where these are not known. `estimates` (frames × outputs) is what was decoded
-    while it was recorded, or None; its columns are `estimate_names`. `time_s` is by the device's clock.
+    `outputs` are the true outputs, without columns if these are not known. `estimates` (frames × outputs) were decoded during
+    the recording, or are None; their columns are `estimate_names`. `time_s` is the time of the device's clock.
     """
 
     estimates: np.ndarray | None
@@ -25,7 +25,7 @@ class Recording(Frames):
 
 
 def read_recording(path: str | Path) -> Recording:
-    """Reads a recording (.mcap). One that was cut by a kill is read as far as it is whole; `taxel view` mends it."""
+    """Reads a recording (.mcap). A recording that was cut off is read up to there; `taxel view` repairs it."""
     readings, (estimates, truth), time_s, (reading_names, output_names) = _native.read_recording(str(path))
     known = [] if truth is None else output_names
     outputs = np.empty((len(readings), 0), np.float32) if truth is None else truth

@@ -1,4 +1,4 @@
-"""A recording in the place of a device."""
+"""A recording that is played like a device."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from taxel._recording import read_recording
 
 
 class Replay:
-    """A recording, played again and again at its own pace, with the methods of `_native.Line`. Its outputs are the estimates,
-    or the true outputs where nothing was decoded. `send` "readings" or "estimates" leaves the others out."""
+    """A recording that is played in a loop at its own speed, with the methods of `_native.Line`. Its outputs are the
+    estimates, or the true outputs if nothing was decoded. `send` "readings" or "estimates" leaves the others out."""
 
     def __init__(self, path: str, send: str | None):
         found = read_recording(path)
@@ -32,7 +32,7 @@ class Replay:
         self.shape = (rows, found.readings.shape[1] // rows, outputs.shape[1] // rows)
 
     def next(self, within_s: float) -> Any:
-        """The frame after the one that was taken last, once it is due."""
+        """The next frame, at its time."""
         wait_s = self._start_s + (self._taken + 1) * self._period_s - time.monotonic()
         time.sleep(min(max(wait_s, 0), within_s))
         if wait_s > within_s:
@@ -41,13 +41,13 @@ class Replay:
         return self._frame(self._taken)
 
     def newest(self, most_age_ms: float) -> Any:
-        """The frame that came last, whatever was taken."""
+        """The newest frame, even if earlier ones were not read."""
         self._taken = int((time.monotonic() - self._start_s) / self._period_s)
         found = self._frame(self._taken)
         return found if found[0][2] <= most_age_ms else None
 
     def close(self) -> None:
-        """Nothing is open."""
+        """Does nothing, because nothing is open."""
 
     def _frame(self, count: int) -> Any:
         came_s = count * self._period_s

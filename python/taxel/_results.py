@@ -1,4 +1,4 @@
-"""What commands tell of scenes and models."""
+"""Results of commands on scenes and models."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from taxel._scene import Scene
 
 
 def source(subject: Scene | str | Path, work: Path) -> object:
-    """A subject as a command takes it."""
+    """A subject as an argument of a command."""
     if isinstance(subject, (str, Path)):
         return subject
     if not isinstance(subject, Scene):
@@ -29,9 +29,10 @@ def source(subject: Scene | str | Path, work: Path) -> object:
 class Trade:
     """Decoders of a subject, by error and time (docs/trade.md).
 
-    `points` has a dict for each, as `trade --json` has them; `front` those that no other beats; `chosen` the one that the
-    bounds select, or None; `model` the chosen one.
-    """
+    `points` has a dict for each, as in `trade --json`; `front` are the points of the Pareto front; `chosen` is the point
+    that the bounds select, or None; `model` is its model.
+   
+  """
 
     def __init__(self, result: dict[str, Any], page: str, svg: str, blob: bytes | None):
         self.result, self.page_html, self.svg = result, page, svg
@@ -67,8 +68,8 @@ def trade(
     seed: int | None = None,
     **options: Any,
 ) -> Trade:
-    """Trains and judges decoders of a scene or a data file, and chooses one within the bounds. Other options are those of
-    `taxel trade`, with underlines: `average=[1, 4]`, `readout="spi"`."""
+    """Trains and evaluates decoders of a scene or a data file, and chooses one within the bounds. Other options are those
+    of `taxel trade`, with underscores: `average=[1, 4]`, `readout="spi"`."""
     with folder() as work:
         out = work / "out"
         arguments: list[object] = ["trade", source(subject, work), "-o", out]
@@ -90,10 +91,11 @@ def trade(
 
 
 class Limit:
-    """What a sensor can know (docs/what-the-sensor-knows.md): the least possible error of any decoder, by group of outputs.
+    """Least possible error of any decoder of a sensor, by group of outputs (docs/what-the-sensor-knows.md).
 
-    `result` is what `limit --json` says.
-    """
+    `result` is that of `limit --json`.
+   
+  """
 
     def __init__(self, result: dict[str, Any]):
         self.result = result
@@ -110,7 +112,7 @@ def limit(scene: Scene | str | Path, *, frames: int | None = None, seed: int | N
 
 
 def evaluate(model: Model | str | Path, X: ArrayLike, y: ArrayLike, *, baseline: ArrayLike | None = None) -> dict[str, Any]:
-    """Errors of a model, or of the blob at a path, on readings `X` and true outputs `y`, as `eval --json` has them."""
+    """Errors of a model, or of the blob at a path, on readings `X` and true outputs `y`, as in `eval --json`."""
     if isinstance(model, (str, Path)):
         model = Model.load(model)
     if not isinstance(model, Model):

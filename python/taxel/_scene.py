@@ -13,17 +13,18 @@ from taxel import _native
 
 
 class Scene:
-    """A sensor, what may happen to it, and how a model is trained for it (docs/scenes.md).
+    """A sensor, its contacts, and how a model is trained for it (docs/scenes.md).
 
     `Scene("press")` is one of the built-in ones (paper, press, contact, moving, shear); `Scene("mine.toml")` a file.
-    """
+   
+  """
 
     def __init__(self, name_or_path: str | Path):
         self._native = _native.Scene(str(name_or_path))
 
     @classmethod
     def from_toml(cls, text: str, name: str = "scene") -> Scene:
-        """Scene of a scene file's text."""
+        """Scene from the text of a scene file."""
         return cls._of(_native.Scene.of_text(name, text))
 
     @classmethod
@@ -33,7 +34,7 @@ class Scene:
         return scene
 
     def replace(self, **fields: Any) -> Scene:
-        """This scene with other values. A field's tables stand before it, with two underlines between:
+        """This scene with other values. A field is preceded by its tables, separated by two underscores:
         `Scene("press").replace(noise__level=0.01, training__centres=32)`. A dict is a table as a whole:
         `noise={"kind": "absolute", "level_ohm": 0.5}`."""
         values = [(name.replace("__", "."), as_toml(value)) for name, value in fields.items()]
@@ -59,7 +60,7 @@ class Scene:
         return self._native.output_names
 
     def to_toml(self) -> str:
-        """The scene as a scene file has it."""
+        """Text of the scene as a scene file."""
         return self._native.text
 
     def __repr__(self) -> str:
@@ -74,7 +75,8 @@ class Frames:
     """Frames of a sensor, and the true outputs.
 
     `readings` (frames × wires) in Ω, `outputs` (frames × outputs) in the units of their names.
-    """
+   
+  """
 
     readings: np.ndarray
     outputs: np.ndarray
@@ -99,8 +101,8 @@ class Frames:
 
 
 def synth(scene: Scene | str | Path, n: int, *, seed: int | None = None, stream: str = "test") -> Frames:
-    """`n` frames of a scene's still contacts, with its noise: those that `taxel train` trains on with
-    `stream="training"`, and fresh ones with `stream="test"`. None takes the scene's own seed."""
+    """`n` frames of a scene's still contacts, with its noise. `stream="training"` gives the frames
+    that `taxel train` trains on, and `stream="test"` gives new ones. Seed None is the scene's own."""
     if stream not in ("training", "test"):
         raise ValueError(f'stream={stream!r}: give "training" or "test"')
     scene = scene if isinstance(scene, Scene) else Scene(scene)
@@ -108,7 +110,7 @@ def synth(scene: Scene | str | Path, n: int, *, seed: int | None = None, stream:
 
 
 def as_toml(value: Any) -> str:
-    """A value as a scene file has it."""
+    """Text of a value in a scene file."""
     if isinstance(value, (np.ndarray, np.generic)):
         value = value.tolist()
     if isinstance(value, (list, tuple)):
