@@ -53,7 +53,7 @@ struct Core<'m, P, F, const ROWS: usize> {
 }
 
 impl<'m, P: Platform, F: FrameSource, const ROWS: usize> App<'m, P, F, ROWS> {
-    /// Makes an application. Its own configuration and constants are those that are kept, else `configuration` and the
+    /// Makes an application. Its own configuration and constants are the stored ones, or else `configuration` and the
     /// constants of `source`.
     pub fn new<const COLUMNS: usize, const OUTPUTS: usize, const BYTES: usize>(
         mut platform: P,

@@ -40,7 +40,7 @@ pub struct Constants<'a> {
     pub series_ohm: Floats<'a>,
 }
 
-/// Why a circuit does not take constants.
+/// Why a circuit rejects constants.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum ConstantsFault {
     /// The circuit's constants are fixed.
@@ -92,12 +92,12 @@ const MOST_OHM: f32 = 1e6;
 /// V_out = V_b + R_f·I, and I = V_d/R. No current flows between wires at one potential, so the
 /// other rows do not disturb (D'Alessio, Sensors and Actuators A 72, 1999). Subtracting the idle sample removes
 /// V_b and the op-amp's offset exactly. The row's own drop V_d − R_s·ΣI is known because all its columns are
-/// measured, or their share is known. A lead in series with a column lets the idle rows feed it: it divides all currents of the column by
-/// 1 + s·Σ1/R, which [`correct`](Self::correct) undoes.
+/// measured, or their share is known. A lead in series with a column lets the idle rows feed it: it divides all currents
+/// of the column by 1 + s·Σ1/R, which [`correct`](Self::correct) undoes.
 ///
-/// A reading is [`f32::INFINITY`] if no current flows (open), and 0 if its sample is saturated: the resistance is too small to
-/// be measured, or shorted. It is NaN if its sample (or its idle sample) could not be taken, or another one of its row is
-/// shorted: nobody knows then how far the row's voltage drops.
+/// A reading is [`f32::INFINITY`] if no current flows (open), and 0 if its sample is saturated: the resistance is too
+/// small to be measured, or shorted. It is NaN if its sample (or its idle sample) could not be taken, or another one of
+/// its row is shorted: the drop of the row's voltage is then unknown.
 ///
 /// ```
 /// use taxel_firmware::circuit::{ScannedRow, ZeroPotential};
@@ -128,7 +128,7 @@ pub struct ZeroPotential<const ROWS: usize, const COLS: usize> {
     pub series_ohm: [f32; COLS],
 }
 
-/// What counts of a converter mean in a circuit.
+/// Scale of a converter's counts in a circuit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Scale<const COLS: usize> {
     /// Current in A of a count, in each column.
@@ -150,7 +150,7 @@ impl<const ROWS: usize, const COLS: usize> ZeroPotential<ROWS, COLS> {
         series_ohm: [0.0; COLS],
     };
 
-    /// What counts of a converter mean whose largest one is `full_scale_counts`.
+    /// Scale of the counts of a converter whose largest count is `full_scale_counts`.
     pub fn scale(&self, full_scale_counts: u16) -> Scale<COLS> {
         let volt_per_count = self.reference_v / (f32::from(full_scale_counts) + 1.0);
         Scale {
@@ -176,8 +176,8 @@ impl<const ROWS: usize, const COLS: usize> ZeroPotential<ROWS, COLS> {
         samples.convert(counts);
     }
 
-    /// The [`load`](ScannedRow::load) of a row, from the `counts` of every column; what cannot be told is that of equal
-    /// columns. NaN if one is saturated.
+    /// The [`load`](ScannedRow::load) of a row, from the `counts` of every column; if it cannot be measured, it is that
+    /// of equal columns. NaN if one is saturated.
     pub fn load(
         &self,
         columns: ColumnWires,

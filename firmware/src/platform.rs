@@ -24,13 +24,13 @@ pub trait Clock {
     }
 }
 
-/// What restarts the board if it is not fed.
+/// Timer that restarts the board if it is not fed.
 pub trait Watchdog {
     /// Feeds the watchdog, so that it waits for another period.
     fn feed_watchdog(&mut self);
 }
 
-/// What survives a restart besides the slots.
+/// Memory besides the slots that survives a restart.
 pub trait Storage {
     /// A page of the journal.
     type Page: Slot;
@@ -39,7 +39,7 @@ pub trait Storage {
     fn journal(&mut self) -> &mut Journal<Self::Page>;
 }
 
-/// A board: its parts, and what it is.
+/// A board: its parts and its identity.
 pub trait Platform: Line + Clock + Watchdog + Storage {
     /// Name of the board, as the link reports it.
     const BOARD: &'static str;

@@ -85,8 +85,8 @@ impl ScanSettings {
     }
 }
 
-/// Longest time in µs for which a scan may go on by itself; then it has failed. No setting makes one as long, and a watchdog
-/// waits longer.
+/// Longest time in µs for which a scan may go on by itself; then it has failed. No setting makes one as long, and a
+/// watchdog waits longer.
 pub const LONGEST_SCAN_US: u64 = 2_000_000;
 
 /// Number of scans between two in which columns are sampled idle.
@@ -104,7 +104,7 @@ pub struct RowTimes {
 /// Report on a scan.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct ScanReport {
-    /// When rows were read; zeros of a source that does not know.
+    /// When rows were read; zeros if the source does not know.
     pub row_times: RowTimes,
     /// Number of samples that could not be taken, those of idle rows included. A failed release of the rows
     /// counts as one.

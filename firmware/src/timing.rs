@@ -6,11 +6,11 @@ use crate::capacity::Capacity;
 use crate::link::message::Configuration;
 use crate::readout::{RowTimes, SCANS_A_ROUND};
 
-/// Clock in Hz of a bus of MCP3208 converters on a processor like the NUCLEO-F446RE's: 45 MHz/64. They take at most 1 MHz at
-/// 3.3 V, and the divider has powers of two.
+/// Clock in Hz of a bus of MCP3208 converters on a processor like the NUCLEO-F446RE's: 45 MHz/64. They take at most 1 MHz
+/// at 3.3 V, and the divider has powers of two.
 const NUCLEO_SPI_HZ: u32 = 703_125;
 
-/// Clock of the NUCLEO-F446RE's processor in MHz, as long as the ST-LINK's is there.
+/// Clock of the NUCLEO-F446RE's processor in MHz, while it has the ST-LINK's clock.
 pub const NUCLEO_MHZ: u32 = 180;
 
 /// Speed of the NUCLEO-F446RE's serial line in bits a second, unless its image is built for another.
@@ -49,13 +49,13 @@ pub const ONCHIP_COLUMNS: u16 = 18;
 /// Most samples of a reading that the NUCLEO-F446RE has memory for at once.
 pub const ONCHIP_SAMPLES: u16 = 16;
 
-/// Ticks that DMA may take to change the rows, which lengthen each wait; 0.2 µs. And ticks from the last sample's time to the
-/// next row.
+/// Ticks that DMA may take to change the rows, which lengthen each wait; 0.2 µs. And ticks from the last sample's time to
+/// the next row.
 const ONCHIP_ROW_TICKS: u32 = 36;
 const ONCHIP_END_TICKS: u32 = 16;
 
-/// Time in µs that the processor takes to add up the samples of a scan of 8 × 18 wires by the on-chip converters, before the
-/// next one starts. From the cycles of the emulated board.
+/// Time in µs that the processor takes to add up the samples of a scan of 8 × 18 wires by the on-chip converters, before
+/// the next one starts. From the cycles of the emulated board.
 pub const ONCHIP_SUMS_US: u32 = 61;
 
 /// Time in µs that it then takes to turn the sums into Ω, while the next scan runs. Counted in QEMU: `cargo xtask cycles`.
@@ -146,8 +146,8 @@ pub struct ScanPlan {
 }
 
 impl ScanPlan {
-    /// Plan of a [`Scanner`](crate::readout::Scanner) with a 74HC595 and MCP3208 converters, for so many wires: a processor like the
-    /// NUCLEO-F446RE's, and the first configuration's wait.
+    /// Plan of a [`Scanner`](crate::readout::Scanner) with a 74HC595 and MCP3208 converters, for so many wires: a
+    /// processor like the NUCLEO-F446RE's, and the first configuration's wait.
     ///
     /// ```
     /// assert_eq!(taxel_firmware::timing::ScanPlan::of_spi(8, 18, 1).scan_us(), 5_573);
@@ -168,7 +168,7 @@ impl ScanPlan {
     }
 
     /// Plan of the image that reads the sensor by the NUCLEO-F446RE's own converters, for so many rows. It samples all
-    /// columns, however many are asked for. The processor decodes the frame before meanwhile.
+    /// columns, however many are requested. Meanwhile, the processor decodes the previous frame.
     ///
     /// ```
     /// use taxel_firmware::timing::ScanPlan;
@@ -251,8 +251,8 @@ impl ScanPlan {
         u64::from(self.rows).saturating_mul(row_ns).saturating_add(between_ns)
     }
 
-    /// Time in ns that the first scan of a round takes besides its rows: for samples of every column while all rows idle, and
-    /// of columns that are not read.
+    /// Time in ns that the first scan of a round takes besides its rows: for samples of every column while all rows idle,
+    /// and of columns that are not read.
     fn of_round_ns(&self) -> u64 {
         let others = self.board_columns.saturating_sub(self.columns);
         self.step_ns(self.board_columns).saturating_add(self.samples_ns(others))

@@ -3,7 +3,7 @@
 /// Share of the level at which a touch begins below which it ends.
 const END: f32 = 0.6;
 
-/// Tells touch from rest, with hysteresis.
+/// Detector of touch, with hysteresis.
 ///
 /// ```
 /// use taxel_core::contact::Detector;

@@ -16,7 +16,7 @@ pub(crate) const OUTPUTS: usize = 18;
 /// Most centres of a batch of the routine for `fixed16`.
 const BATCH: usize = 256;
 
-/// A network's parameters as plain words, with the counts that tell how to read them. Assembly reads this, so that
+/// A network's parameters as plain words, with the counts that are needed to read them. Assembly reads this, so that
 /// order and sizes are its own.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[repr(C)]

@@ -76,7 +76,7 @@ pub struct Decoder<'a, const ROWS: usize> {
 enum OwnNetworks<'a, const ROWS: usize> {
     /// Each row's network; rows beyond the model's have none.
     OfRows([RowNetwork<'a>; ROWS]),
-    /// Networks that see whole frames, and what stands before each.
+    /// Networks that see whole frames, each with its front.
     OfFrames([(Front<'a>, RowNetwork<'a>); MOST_FRONTS]),
 }
 
@@ -185,7 +185,7 @@ impl<'a, const ROWS: usize> Decoder<'a, ROWS> {
         )
     }
 
-    /// Replaces missing readings of a frame (Ω) by those expected of the others, by the model's
+    /// Replaces missing readings of a frame (Ω) by those expected from the others, by the model's
     /// [reading model](crate::reading_model). Returns the number of readings that were filled; 0 if the model has none.
     ///
     /// A model with relative inputs takes the `reciprocals` of the baseline ([`Frame`]), which others ignore. `scratch` is
@@ -200,9 +200,9 @@ impl<'a, const ROWS: usize> Decoder<'a, ROWS> {
         self.model.reading_model().map_or(0, |it| it.fill(readings_ohm, reciprocals, scratch))
     }
 
-    /// Tells how far off the outputs of a frame may be, and how novel the frame is, by the model's
+    /// Estimates how far off the outputs of a frame may be, and how novel the frame is, by the model's
     /// [reading model](crate::reading_model). Returns its novelty in nats: above 0, it is unlike the frames of training.
-    /// `None` if the model does not tell it; nothing is written then.
+    /// `None` if the model does not estimate it; nothing is written then.
     ///
     /// `deviation` takes a standard deviation for each of the `rows × outputs` outputs, in their units. If a reading
     /// of the frame is missing, all of them and the novelty are NaN.
@@ -263,7 +263,7 @@ fn decoding_floats(model: &Model<'_>) -> usize {
 pub struct OwnedEstimate {
     /// `rows × outputs` numbers, row after row; NaN where a row could not be decoded.
     pub outputs: std::vec::Vec<f32>,
-    /// How the decoding of each row ended.
+    /// Status of each row.
     pub status: std::vec::Vec<RowStatus>,
 }
 

@@ -1,6 +1,6 @@
 //! The estimate that a frame is decoded to.
 
-/// How the decoding of one row of a frame ended.
+/// Status of one row of a decoded frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum RowStatus {
     /// The row was decoded; its outputs are valid.
@@ -11,16 +11,16 @@ pub enum RowStatus {
     /// Readings or weights were so large that an output overflowed; the outputs are NaN. Of several networks that see
     /// whole frames, those outputs are whose network overflowed.
     Overflow,
-    /// Nothing touches the sensor enough to have a place: outputs that are places are NaN, all others are valid.
+    /// No touch is strong enough to have a place: outputs that are places are NaN, all others are valid.
     NoTouch,
 }
 
-/// Where a decoder writes the outputs of a frame, and the status of each row.
+/// Memory for the outputs of a frame, and for the status of each row.
 #[derive(Debug, PartialEq)]
 pub struct Estimate<'e> {
     /// `rows × outputs` numbers, row after row, in the units of the model's output columns. NaN where a row could
     /// not be decoded.
     pub outputs: &'e mut [f32],
-    /// How the decoding of each row ended.
+    /// Status of each row.
     pub status: &'e mut [RowStatus],
 }

@@ -25,7 +25,7 @@ const CERTAIN: f32 = 2.5;
 /// Least variance in mm² of a place.
 const LEAST_VARIANCE: f32 = 1e-6;
 
-/// What an event is of.
+/// Kind of an event.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Kind {
     /// Something touches.
@@ -50,7 +50,7 @@ pub struct Settings {
     pub slip_mm_per_s: f32,
 }
 
-/// What a frame tells of a touch.
+/// Touch in a frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Shown {
     /// Time in µs at which the frame began, by a clock of any start.
@@ -63,7 +63,7 @@ pub struct Shown {
     pub place_mm: Option<([f32; 2], f32)>,
 }
 
-/// What goes on, and what the newest frame changed of it.
+/// Events that are going on, and those that the newest frame changed.
 ///
 /// ```
 /// use taxel_core::events::{Events, Kind, Settings, Shown};
@@ -89,7 +89,7 @@ pub struct Events {
 }
 
 impl Events {
-    /// Takes what the newest frame tells. There is no slip without touch or load.
+    /// Takes the touch in the newest frame. There is no slip without touch or load.
     pub fn update(&mut self, settings: Settings, shown: Shown) {
         let level = |threshold: f32| if threshold > 0.0 { threshold } else { f32::INFINITY };
         let load = self.load.update(shown.load, level(settings.load));
@@ -125,12 +125,12 @@ impl Events {
         Some(if share < 1.0 { speed } else { 0.0 })
     }
 
-    /// Whether it goes on.
+    /// Whether an event of this kind is going on.
     pub fn is_on(&self, kind: Kind) -> bool {
         self.now[kind as usize]
     }
 
-    /// What the newest frame changed: `Some(true)` if it began, `Some(false)` if it ended.
+    /// Change by the newest frame: `Some(true)` if the event began, `Some(false)` if it ended.
     pub fn changed(&self, kind: Kind) -> Option<bool> {
         let [now, before] = [self.now, self.before].map(|of| of[kind as usize]);
         (now != before).then_some(now)

@@ -56,7 +56,7 @@ pub struct Fixed<
     pub networks: Networks<'static, 'static, N>,
     /// Whether inputs are [relative](crate::relative) to the baseline.
     pub relative_inputs: bool,
-    /// What fills missing readings, and may tell novelty and deviations.
+    /// Statistics that fill missing readings, and may estimate novelty and deviations.
     pub reading_model: Option<ReadingModel<'static>>,
 }
 
@@ -65,7 +65,7 @@ pub struct Fixed<
 pub struct Decoded<const ROWS: usize, const OUTPUTS: usize> {
     /// Outputs of each row, in the units of the model's output columns. NaN where a row could not be decoded.
     pub outputs: [[f32; OUTPUTS]; ROWS],
-    /// How the decoding of each row ended.
+    /// Status of each row.
     pub status: [RowStatus; ROWS],
     /// Whether an input of a decoded row was clamped ([`Decoder::decode_into`](crate::Decoder::decode_into)).
     pub clamped: bool,
@@ -139,7 +139,7 @@ impl<N: Infer, const ROWS: usize, const INPUTS: usize, const OUTPUTS: usize, con
     }
 
     /// Writes the standard deviation of each output, and returns the novelty of a frame in nats, as
-    /// [`Decoder::assess_into`](crate::Decoder::assess_into) does; NaN if the model does not tell it.
+    /// [`Decoder::assess_into`](crate::Decoder::assess_into) does; NaN if the model does not estimate it.
     #[inline(always)]
     pub fn assess(
         &self,

@@ -44,7 +44,7 @@ impl Wires {
     }
 }
 
-/// A set of column-wires: bit k stands for column-wire k.
+/// A set of column-wires: bit k is column-wire k.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct ColumnWires(pub u32);
 

@@ -9,7 +9,7 @@ use crate::rbf::NetworkError;
 use crate::relative::relative;
 use crate::touch::{Kind, Touch};
 
-/// A frame to be decoded, and what is known of the sensor at rest.
+/// A frame to be decoded, with the baseline of the sensor at rest.
 #[derive(Debug, Clone, Copy)]
 pub struct Frame<'f> {
     /// `rows × inputs` readings in Ω, row after row; NaN is missing.
@@ -31,12 +31,12 @@ impl<'f> From<&'f [f32]> for Frame<'f> {
 pub enum Networks<'n, 'a, N> {
     /// A network for each row.
     OfRows(&'n [N]),
-    /// Networks that see whole frames, and what stands before each. Each gives the outputs that follow those of the network
-    /// before.
+    /// Networks that see whole frames, each with its front. Each gives the outputs that follow those of the previous
+    /// network.
     OfFrames(&'n [(Front<'a>, N)]),
 }
 
-/// What decodes frames, wherever its networks lie.
+/// Decoder of frames, wherever its networks lie.
 #[derive(Debug, Clone, Copy)]
 pub struct FrameDecoder<'n, 'a, N> {
     pub shape: ModelShape,
@@ -258,8 +258,8 @@ impl<N: Infer> WholeFrames<'_, '_, N> {
     }
 }
 
-/// Makes `outputs` of a network what they are at this `strength`: amounts are multiplied by it, and places are NaN without a
-/// touch. Returns their status.
+/// Makes `outputs` of a network what they are at this `strength`: amounts are multiplied by it, and places are NaN
+/// without a touch. Returns their status.
 #[inline(always)]
 fn with_strength(
     touch: &Touch<'_>,

@@ -13,7 +13,7 @@ impl Limits {
     /// Limits for rubber of about 60 Ω: those of a device until it is configured otherwise.
     pub const USUAL: Self = Self { shorted_below_ohm: 5.0, open_above_ohm: 1000.0 };
 
-    /// The fault of a `reading` in Ω; `None` if it can be believed.
+    /// The fault of a `reading` in Ω; `None` if it is plausible.
     ///
     /// ```
     /// use taxel_core::health::{Fault, Limits};
@@ -33,7 +33,7 @@ impl Limits {
     }
 }
 
-/// What is wrong with a reading.
+/// Fault of a reading.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Fault {
     /// It was not taken (NaN).
@@ -44,7 +44,7 @@ pub enum Fault {
     Open,
 }
 
-/// Largest number of column-wires whose faults can be told apart.
+/// Largest number of column-wires whose faults can be distinguished.
 pub const MOST_COLUMNS: usize = 32;
 
 /// Number of faults in the readings of one frame, by kind.

@@ -4,7 +4,7 @@ use crate::blob::{ModelShape, NetworkSection};
 use crate::estimate::RowStatus;
 use crate::rbf::{Format, Network, NetworkError, fixed16, float32};
 
-/// What a network infers, and where to: a row, or all rows at once.
+/// Inputs and outputs of one inference: of a row, or of all rows at once.
 pub struct Row<'r> {
     /// One number an input, not scaled yet.
     pub inputs: &'r [f32],

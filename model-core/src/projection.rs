@@ -38,7 +38,7 @@ impl<'a> Projection<'a> {
     }
 
     /// Makes a projection of an array in a program: f₀, then for each reading its part in each feature. Numbers are not
-    /// looked at.
+    /// checked.
     pub const fn of_array<const FEATURES: usize, const LINES: usize>(
         array: &'a [[f32; FEATURES]; LINES],
     ) -> Self {

@@ -38,7 +38,7 @@ pub struct Sizes {
     pub readings: usize,
     /// Number of factors. Features are one more.
     pub factors: usize,
-    /// Number of components of the mixture; 0 of a model that fills missing readings, and no more.
+    /// Number of components of the mixture; 0 for a model that only fills missing readings.
     pub components: usize,
     /// Number of outputs of all rows.
     pub outputs: usize,
@@ -122,16 +122,16 @@ impl<'a> Arrays<'a> {
 
 impl<'a> ReadingModel<'a> {
     /// Makes a reading model of a block, whose arrays are in this order: m of every reading, in its unit; s of every
-    /// reading, one over its unit, and 0 for a reading that never changed; a zero for each factor; V of every factor for one
-    /// reading after the other. With components, there follow c, −o of every feature, and W column after column for one
-    /// component after the other; v of every output (in its unit, squared) for one component after the other; half the 95 %
-    /// interval of every output, in deviations; the threshold of −ln p(f).
+    /// reading, one over its unit, and 0 for a reading that never changed; a zero for each factor; V of every factor for
+    /// one reading after the other. With components, there follow c, −o of every feature, and W column after column for
+    /// one component after the other; v of every output (in its unit, squared) for one component after the other; half
+    /// the 95 % interval of every output, in deviations; the threshold of −ln p(f).
     ///
     /// # Errors
-    /// [`NetworkError::Empty`] without readings, factors or outputs, [`NetworkError::Length`] for a block of another length,
-    /// [`NetworkError::NotFinite`] for a number that is NaN or infinite, or variances whose sum may be,
-    /// [`NetworkError::NotPositive`] for a scale, variance or ratio that is negative, or parts V of a reading whose squares
-    /// sum up to 1 or more.
+    /// [`NetworkError::Empty`] without readings, factors or outputs, [`NetworkError::Length`] for a block of another
+    /// length, [`NetworkError::NotFinite`] for a number that is NaN or infinite, or variances whose sum may be,
+    /// [`NetworkError::NotPositive`] for a scale, variance or ratio that is negative, or parts V of a reading whose
+    /// squares sum up to 1 or more.
     pub fn new(sizes: Sizes, block: &'a [f32]) -> Result<Self, NetworkError> {
         const WHAT: &str = "reading model";
         if [sizes.readings, sizes.factors, sizes.outputs].contains(&0) {
@@ -161,7 +161,7 @@ impl<'a> ReadingModel<'a> {
         }
     }
 
-    /// Makes a reading model of an array in a program, as [`new`](Self::new) takes it. Numbers are not looked at.
+    /// Makes a reading model of an array in a program, as [`new`](Self::new) takes it. Numbers are not checked.
     ///
     /// # Panics
     /// If the array has another length.
@@ -185,13 +185,13 @@ impl<'a> ReadingModel<'a> {
         self.block
     }
 
-    /// Whether the model tells novelty and deviations, besides filling missing readings.
+    /// Whether the model estimates novelty and deviations, besides filling missing readings.
     pub const fn assesses(&self) -> bool {
         self.sizes.components > 0
     }
 
     /// Half of each output's 95 % interval, in deviations; half of its 68 % interval is one deviation. Empty if the model
-    /// tells no deviations.
+    /// estimates no deviations.
     pub fn ratios_95(&self) -> &'a [f32] {
         self.arrays().ratios_95
     }
@@ -207,8 +207,8 @@ impl<'a> ReadingModel<'a> {
         Arrays::cut(self.sizes, self.block).unwrap_or_default()
     }
 
-    /// Replaces missing readings (not finite) of a frame by those expected of the others, in their unit. Returns the number
-    /// of readings that were filled.
+    /// Replaces missing readings (not finite) of a frame by those expected from the others, in their unit. Returns the
+    /// number of readings that were filled.
     ///
     /// For a model with relative inputs, `reciprocals` are those of the baseline, and a reading without one stays as it is.
     /// `scratch` is working space of [`scratch_floats`](Sizes::scratch_floats). Nothing is filled if none is missing, if
@@ -267,13 +267,13 @@ impl<'a> ReadingModel<'a> {
         filled
     }
 
-    /// Writes the deviation of every output (in its unit) to `deviation`, and returns the frame's novelty in nats; `None` if
-    /// the model tells neither, and nothing is written then.
+    /// Writes the deviation of every output (in its unit) to `deviation`, and returns the frame's novelty in nats; `None`
+    /// if the model estimates neither, and nothing is written then.
     ///
     /// `readings` are those of the whole frame in the model's unit, as many as the sizes say; a model with relative inputs
-    /// takes the `reciprocals` of the baseline, too. If a reading is missing (NaN, or infinite where training saw no change),
-    /// all results are NaN. A frame so far from all of training that its density leaves f32 has the novelty [`f32::MAX`],
-    /// and NaN for deviations.
+    /// takes the `reciprocals` of the baseline, too. If a reading is missing (NaN, or infinite where training saw no
+    /// change), all results are NaN. A frame so far from all of training that its density leaves f32 has the novelty
+    /// [`f32::MAX`], and NaN for deviations.
     ///
     /// # Errors
     /// [`NetworkError::Length`] if there are not as many `readings` or places of `deviation` as the sizes say, or `scratch`
@@ -317,8 +317,8 @@ impl<'a> ReadingModel<'a> {
         Ok(Some((-(best + libm::logf(sum)) - threshold).clamp(f32::MIN, f32::MAX)))
     }
 
-    /// Writes the [features](Sizes::features) of a frame, as [`assess`](Self::assess) computes them: training needs the very
-    /// same bits.
+    /// Writes the [features](Sizes::features) of a frame, as [`assess`](Self::assess) computes them: training needs the
+    /// very same bits.
     ///
     /// `z` takes the standardised readings. Returns whether no reading is missing (NaN, or infinite where s is 0).
     pub fn features(

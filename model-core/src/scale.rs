@@ -49,7 +49,7 @@ pub const UNITS_PER_STEP: f32 = 65_536.0;
 /// Whether a scaled reading in [`UNITS`] is clamped: the conversion to `i32` saturates below −[`UNITS`], and at
 /// [`UNITS`] and above. True for NaN.
 ///
-/// A Cortex-M4F tells at no cost: such a conversion leaves the flag of an invalid operation behind.
+/// A Cortex-M4F finds this out at no cost: such a conversion leaves the flag of an invalid operation behind.
 #[inline]
 pub fn saturates(scaled: f32) -> bool {
     !(-UNITS..UNITS).contains(&scaled)

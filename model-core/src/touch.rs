@@ -18,13 +18,13 @@ use crate::relative::relative;
 pub struct Strengths {
     /// S₀, which keeps the shape finite without a touch.
     pub floor: f32,
-    /// What is added to S before its logarithm: below it, strengths hardly differ.
+    /// Number that is added to S before its logarithm: below it, strengths hardly differ.
     pub logarithm_floor: f32,
     /// Least strength of a touch that has a place.
     pub least: f32,
     /// Largest strength that outputs are multiplied by.
     pub most: f32,
-    /// 1 or −1 where a touch moves readings up or down, 0 where it moves them either way.
+    /// 1 or −1 if a touch moves readings up or down, 0 if it moves them either way.
     pub side: f32,
 }
 
@@ -36,16 +36,16 @@ pub const fn block_floats(readings: usize) -> usize {
     readings.saturating_mul(2).saturating_add(HEAD)
 }
 
-/// What outputs of a network are to the strength of a touch.
+/// Relation of a network's outputs to the strength of a touch.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Kind {
-    /// They tell where a touch is. Without a touch there is none: they are NaN below the least strength.
+    /// Outputs are the place of a touch. They are NaN below the least strength, as there is no place without a touch.
     Place,
-    /// They tell how much there is of it, as forces, depths and deformations do: the network's outputs times S.
+    /// Outputs are amounts of a touch, such as forces, depths and deformations: the network's outputs times S.
     Amount,
 }
 
-/// How readings become the shape and the strength of a touch, borrowed from a blob.
+/// Transformation of readings to the shape and the strength of a touch, borrowed from a blob.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Touch<'a> {
     kind: Kind,
@@ -84,7 +84,7 @@ impl<'a> Touch<'a> {
         Ok(Self::of_checked(kind, block))
     }
 
-    /// Makes one of an array in a program, as [`new`](Self::new) takes it. Numbers are not looked at.
+    /// Makes one of an array in a program, as [`new`](Self::new) takes it. Numbers are not checked.
     ///
     /// # Panics
     /// If it has no reading, or half of one.
@@ -109,7 +109,7 @@ impl<'a> Touch<'a> {
         touch
     }
 
-    /// What the network's outputs are to the strength.
+    /// Relation of the network's outputs to the strength.
     pub fn kind(&self) -> Kind {
         self.kind
     }
@@ -119,7 +119,7 @@ impl<'a> Touch<'a> {
         self.whole_changes
     }
 
-    /// Numbers that it was made of.
+    /// Numbers of the transformation.
     pub fn block(&self) -> &'a [f32] {
         self.block
     }
@@ -129,12 +129,12 @@ impl<'a> Touch<'a> {
         self.pairs().len()
     }
 
-    /// Number of inputs that it makes of them: one more.
+    /// Number of inputs that it gives the network: one more than readings.
     pub const fn inputs(&self) -> usize {
         self.readings().saturating_add(1)
     }
 
-    /// Its numbers before those of single readings.
+    /// Numbers before those of single readings.
     pub const fn strengths(&self) -> Strengths {
         let [floor, logarithm_floor, least, most, side] = match self.block.first_chunk::<HEAD>() {
             Some(head) => *head,
@@ -228,7 +228,8 @@ impl<'a> Touch<'a> {
     }
 }
 
-/// Twice what of a `change` exceeds the `threshold` to this `side`, or to any (0), and the same with the sign of the change.
+/// Twice what of a `change` exceeds the `threshold` to this `side`, or to any (0), and the same with the sign of the
+/// change.
 #[inline(always)]
 pub fn twice_beyond(change: f32, threshold: f32, side: f32) -> [f32; 2] {
     if side == 0.0 {

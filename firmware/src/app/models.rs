@@ -16,10 +16,10 @@ use crate::store::{ConfirmedModels, ERASES_AT_ONCE, FlashError, Slot, blob_in_sl
 /// Longest trial in ms.
 const MOST_TRIAL_MS: u32 = 1_800_000;
 
-/// What is known of the models besides the slots.
+/// State of the models besides the slots.
 pub struct Models {
     pub capacity: Capacity,
-    /// Which were confirmed when the session began.
+    /// Models that were confirmed when the session began.
     pub confirmed: ConfirmedModels,
     /// Progress of an upload, whose bytes are in the spare slot.
     upload: UploadState,
@@ -104,9 +104,9 @@ impl Models {
         Ok(self.upload)
     }
 
-    /// Prepares `spare`, the slot of this number, for a blob with this `head`. The slot is erased unless it still is from the
-    /// last begin; the journal says before that no model of it counts any more. The watchdog is fed just before and after an
-    /// erase, which may take half of its period.
+    /// Prepares `spare`, the slot of this number, for a blob with this `head`. The slot is erased unless it still is from
+    /// the last begin; the journal says before that no model of it counts any more. The watchdog is fed just before and
+    /// after an erase, which may take half of its period.
     fn begin<P: Platform, S: Slot>(
         &mut self,
         head: &[u8],

@@ -137,8 +137,9 @@ impl<'m, F: FrameSource, const ROWS: usize> Sensor<'m, F, ROWS> {
         Health::new(frame, self.wiring.line, limits, &mut self.faulty_columns)
     }
 
-    /// Whether the last frame differs from the baseline as under a contact: by the largest relative change, since a device
-    /// knows no noise at rest. A frame that is not one of a series neither continues a contact nor ends it.
+    /// Whether the last frame differs from the baseline as under a contact: by the largest relative change, because a
+    /// device does not know its noise at rest. A frame that is not one of a series neither continues a contact nor ends
+    /// it.
     pub fn is_touched(&mut self, is_of_series: bool) -> bool {
         let change = self.baseline.largest_relative_deviation(self.frame);
         let change = change.filter(|_| self.capture.is_none()).unwrap_or(0.0);
@@ -149,7 +150,7 @@ impl<'m, F: FrameSource, const ROWS: usize> Sensor<'m, F, ROWS> {
 }
 
 impl<F: FrameSource, const ROWS: usize> Sensor<'_, F, ROWS> {
-    /// Scans the wires of a model with inputs of these `names` from now on. A baseline of others is given up.
+    /// Scans the wires of a model with inputs of these `names` from now on. A baseline of other wires is discarded.
     pub fn scan_wires<P: Platform>(
         &mut self,
         capacity: Capacity,
@@ -302,7 +303,8 @@ impl<F: FrameSource, const ROWS: usize> Sensor<'_, F, ROWS> {
         info!("configured: a frame every {=u32} us", configuration.frame_period_us);
     }
 
-    /// Puts constants in force. A baseline that was read with others means nothing any more. Returns whether they changed.
+    /// Puts constants in force. A baseline that was read with other constants is no longer valid. Returns whether they
+    /// changed.
     pub fn set_constants<P: Platform>(
         &mut self,
         constants: Constants<'_>,

@@ -44,16 +44,16 @@ pub struct Work<'m, const ROWS: usize> {
     pub events: Events,
     /// Whether the tracker followed the contact to the frame that was decoded last.
     pub is_followed: bool,
-    /// Place of the model's force among its outputs, if it tells one.
+    /// Index of the force among the model's outputs, if it has one.
     pub force: Option<usize>,
-    /// Standard deviations of the outputs, for a model that tells them.
+    /// Standard deviations of the outputs, for a model that estimates them.
     pub deviations: &'m mut [f32],
 }
 
 impl<const ROWS: usize> Work<'_, ROWS> {
-    /// Decodes the sensor's frame without its faulty readings, unless the model's tracker explains it: by the network, whose
-    /// estimate passes the filter in time. A frame that is not of a `scan`, one of a series, is decoded by itself. The
-    /// tracker writes outputs only where they are wanted.
+    /// Decodes the sensor's frame without its faulty readings, unless the model's tracker explains it: by the network,
+    /// whose estimate passes the filter in time. A frame that is not of a `scan`, one of a series, is decoded by itself.
+    /// The tracker writes outputs only where they are wanted.
     pub fn decode<P: Platform, F: FrameSource>(
         &mut self,
         sensor: &mut Sensor<'_, F, ROWS>,
@@ -190,7 +190,7 @@ impl<const ROWS: usize> Work<'_, ROWS> {
     }
 
     /// Computes the confidence of the frame that was decoded last, unless nothing of it is `wanted`. Returns the frame's
-    /// novelty if the model tells it, and adds to the `flags` whether it is novel.
+    /// novelty if the model estimates it, and adds to the `flags` whether it is novel.
     pub fn assess<P: Platform>(
         &mut self,
         frame_ohm: &[f32],

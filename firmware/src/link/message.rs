@@ -156,7 +156,7 @@ pub enum Report<'a> {
     Constants(#[serde(borrow)] Constants<'a>),
     /// The settings that are kept over restarts.
     Kept(Kept),
-    /// What the readout found when it tested itself.
+    /// Result of the readout's self-test.
     Diagnosis(Diagnosis),
     /// A touch, its load or its slip began or ended; sent before the estimate of the scan that shows it.
     Event(EventReport),
@@ -178,11 +178,11 @@ pub struct EstimateReport<'a> {
     #[serde(borrow)]
     pub outputs: Floats<'a>,
     /// Novelty of the frame in nats: above 0, it is unlike the frames of training. NaN if a reading is missing, and the
-    /// largest number of f32 if the frame is too far off to tell. `None` if the model does not tell it, or it was not
-    /// asked for.
+    /// largest number of f32 if the frame is too far off to compute it. `None` if the model does not estimate it, or it was
+    /// not requested.
     pub novelty: Option<f32>,
     /// Standard deviation of every output of this frame before it is filtered, in its unit; NaN if a reading is missing.
-    /// None at all if the model does not tell them, or they were not asked for.
+    /// Empty if the model does not estimate them, or they were not requested.
     #[serde(borrow)]
     pub deviation: Floats<'a>,
 }
@@ -216,9 +216,9 @@ pub struct EventReport {
     pub start_us: u64,
     /// Time in µs from there until the events were known, and shown on the board's pins.
     pub after_us: u32,
-    /// What began or ended.
+    /// Events that began or ended.
     pub changed: u8,
-    /// What goes on.
+    /// Events that are going on.
     pub going_on: u8,
 }
 

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 /// Number of pins that converters sample.
 pub const PINS: usize = 9;
 
-/// What a readout finds when it tests itself, in counts of its converters. A converter that does not answer gives
+/// Result of a readout's self-test, in counts of its converters. A converter that does not answer gives
 /// [`NO_ANSWER`](Self::NO_ANSWER).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct Diagnosis {
@@ -13,7 +13,7 @@ pub struct Diagnosis {
     pub reference: u16,
     /// The temperature sensor.
     pub temperature: u16,
-    /// What the factory measured at 3.3 V: the reference, and the temperature sensor at 30 °C and at 110 °C.
+    /// Factory measurements at 3.3 V: the reference, and the temperature sensor at 30 °C and at 110 °C.
     pub factory: [u16; 3],
     /// Each pin with its own pull-up on, and the pull-downs of all others.
     pub pulled_up: [u16; PINS],
@@ -34,7 +34,7 @@ pub struct Diagnosis {
 }
 
 impl Diagnosis {
-    /// In place of counts: the converter did not answer.
+    /// Value in place of counts if the converter did not answer.
     pub const NO_ANSWER: u16 = u16::MAX;
 
     /// Parts of a pass that move items, in the order in which one needs the other.

@@ -3,7 +3,7 @@
 use super::journal::{Journal, KeepError, Kind};
 use super::{Slot, blob_in_slot};
 
-/// Which models were confirmed, and which of them is in force, as the journal keeps it.
+/// Models that were confirmed, and the one in force, as the journal keeps them.
 ///
 /// A blob in a slot counts if its CRC-32 is the one here: an upload that was not confirmed never comes into force.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -20,7 +20,8 @@ impl ConfirmedModels {
     /// No model at all.
     pub const NONE: Self = Self { generation: 0, in_force: 0, crcs: [None; 2] };
 
-    /// Reads them. As long as no upload has begun, a model in slot 0 counts, flashed together with the firmware.
+    /// Reads the confirmed models. As long as no upload has begun, a model in slot 0 counts, flashed together with the
+    /// firmware.
     pub fn read<P: Slot, S: Slot>(journal: &Journal<P>, slots: &[S; 2]) -> Self {
         match journal.read(Kind::Models) {
             Some(content) => Self::decode(content).unwrap_or(Self::NONE),
@@ -40,13 +41,13 @@ impl ConfirmedModels {
         })
     }
 
-    /// The next ones, with the model in this `slot` in force, and these `crcs`.
+    /// Confirmed models after a change: the model in this `slot` is in force, and their CRCs are `crcs`.
     #[must_use]
     pub fn exchanged(&self, slot: usize, crcs: [Option<u32>; 2]) -> Self {
         Self { generation: self.generation.wrapping_add(1), in_force: slot, crcs }
     }
 
-    /// Keeps them: they hold from now on, and over restarts. Returns whether something was written.
+    /// Keeps the confirmed models: they hold from now on, and over restarts. Returns whether something was written.
     ///
     /// # Errors
     /// Every variant of [`KeepError`]; the old or the new ones are kept.

@@ -53,7 +53,7 @@ const ROOM: usize = 4 * CELL;
 /// Number of times that an item is written, each time behind the last, until it is given up.
 const ATTEMPTS: usize = 4;
 
-/// What an item is.
+/// Kind of an item.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Kind {
     /// The configuration at the start.
@@ -91,7 +91,7 @@ pub enum KeepError {
 }
 
 /// A journal in two pages of flash, each of which is erased as a whole. It may be cut off from power at any moment: then
-/// what is being kept is the old or the new.
+/// either the old or the new content is kept.
 ///
 /// A page has at least [`PAGE_BYTES`]; if it is shorter, nothing can be kept.
 #[derive(Clone)]

@@ -27,8 +27,8 @@ pub struct Model<'a> {
     /// Whether networks see whole frames, each behind a front.
     whole_frames: bool,
     networks: u8,
-    /// The sections of the linear decoder's errors, of the reading model and of the tracker, if there are any, and those of the
-    /// networks: nothing else is kept of the first three, to save RAM.
+    /// The sections of the linear decoder's errors, of the reading model and of the tracker, if there are any, and those
+    /// of the networks: nothing else is kept of the first three, to save RAM.
     last_sections: &'a [u8],
 }
 
@@ -154,29 +154,30 @@ impl<'a> Model<'a> {
         self.whole_frames
     }
 
-    /// What stands before each network that sees whole frames, in their order; nothing for networks of rows.
+    /// Fronts of the networks that see whole frames, in their order; none for networks of rows.
     pub fn fronts(&self) -> impl Iterator<Item = Front<'a>> {
         let of_frames = self.whole_frames.then(|| self.parts());
         of_frames.into_iter().flatten().map(|part| part.front)
     }
 
-    /// Statistics of the readings, which fill missing ones and may tell novelty and deviations; `None` if the model has none.
+    /// Statistics of the readings, which fill missing ones and may estimate novelty and deviations; `None` if the model
+    /// has none.
     pub fn reading_model(&self) -> Option<ReadingModel<'a>> {
         self.cut_reading_model().0
     }
 
-    /// Whether the model tells novelty and deviations.
+    /// Whether the model estimates novelty and deviations.
     pub fn assesses(&self) -> bool {
         self.reading_model().is_some_and(|it| it.assesses())
     }
 
-    /// RMSE of the best linear decoder for each output, in its unit, on training data that it was not fitted to; empty if the
-    /// model does not tell it.
+    /// RMSE of the best linear decoder for each output, in its unit, on training data that it was not fitted to; empty if
+    /// the model does not have it.
     pub fn linear_rmse(&self) -> Floats<'a> {
         take_linear(self.last_sections, self.shape).map_or(Floats(&[]), |(rmse, _)| rmse)
     }
 
-    /// What tracks a contact over frames; `None` if the model has none.
+    /// Tracker of a contact over frames; `None` if the model has none.
     pub fn tracker(&self) -> Option<Tracker<'a>> {
         cut_tracker(self.cut_reading_model().1, self.shape).ok()?.0
     }

@@ -21,14 +21,14 @@ use crate::track::Tracker;
 /// Contents of a blob: what [`encode`] writes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ModelParts<'a> {
-    /// What stands before each network that sees whole frames; nothing for networks of rows.
+    /// Front of each network that sees whole frames; none for networks of rows.
     pub fronts: &'a [Front<'a>],
-    /// RMSE of the best linear decoder for each output, in its unit, on training data that it was not fitted to; empty if it
-    /// is not known.
+    /// RMSE of the best linear decoder for each output, in its unit, on training data that it was not fitted to; empty if
+    /// it is not known.
     pub linear_rmse: Floats<'a>,
     /// Statistics of the readings.
     pub reading_model: Option<ReadingModel<'a>>,
-    /// What tracks a contact over frames.
+    /// Tracker of a contact over frames.
     pub tracker: Option<Tracker<'a>>,
     /// The networks; all have the same number of inputs and of outputs.
     pub networks: &'a [Network<'a>],

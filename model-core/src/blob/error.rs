@@ -92,7 +92,7 @@ pub enum DecodeError {
         /// Name of the field.
         field: &'static str,
     },
-    /// The parameters of what stands before a projection are not valid.
+    /// The parameters of shape and strength in front of a projection are not valid.
     #[error("touch: {cause}")]
     Touch {
         /// What is wrong with them.
@@ -156,7 +156,7 @@ pub enum EncodeError {
         /// Largest value that the format holds.
         most: usize,
     },
-    /// Networks and what stands before them do not go together: they are not equally many, or inputs or outputs differ.
+    /// Networks and their fronts do not match: their numbers differ, or their inputs or outputs do.
     #[error("network {index} does not fit its front")]
     UnfitFront {
         /// Index of the network, from 0.
@@ -168,7 +168,7 @@ pub enum EncodeError {
         /// Index of the network, from 0.
         index: usize,
     },
-    /// The outputs of networks that see whole frames do not divide among the rows.
+    /// The outputs of networks that see whole frames cannot be divided evenly among the rows.
     #[error("{outputs} outputs cannot be divided evenly among {rows} rows")]
     UnevenRows {
         /// Number of outputs of all networks.

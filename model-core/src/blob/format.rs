@@ -114,7 +114,7 @@ pub(super) struct ReadingModelHeader {
     pub tag: u8,
     /// Number of factors.
     pub factors: u16,
-    /// Number of components of the mixture; 0 of a model that fills missing readings, and no more.
+    /// Number of components of the mixture; 0 for a model that only fills missing readings.
     pub components: u16,
 }
 

@@ -10,10 +10,10 @@ use crate::touch::{self, Kind, Touch};
 /// Most networks of a model that see whole frames: each gives other outputs.
 pub const MOST_FRONTS: usize = 4;
 
-/// What stands before a network that sees whole frames, and how many outputs the network gives.
+/// Front of a network that sees whole frames: what is computed of a frame first, and the number of the network's outputs.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Front<'a> {
-    /// Number of the model's outputs that the network gives: those that follow the outputs of the network before.
+    /// Number of the model's outputs that the network gives: those that follow the outputs of the previous network.
     pub outputs: usize,
     /// Shape and strength that readings become first; `None` for readings as they are.
     pub touch: Option<Touch<'a>>,
@@ -34,7 +34,7 @@ impl<'a> Front<'a> {
         }
     }
 
-    /// What makes shape and strength of readings, if the network's outputs are places, which are none without a touch.
+    /// Shape and strength that readings become, if the network's outputs are places, which are missing without a touch.
     pub fn of_places(&self) -> Option<Touch<'a>> {
         self.touch.filter(|touch| touch.kind() == Kind::Place)
     }

@@ -11,7 +11,7 @@ pub struct Shape {
     pub outputs: usize,
 }
 
-/// Why parameters make no network, or why a buffer does not fit one.
+/// Why parameters are not a network, or why a buffer does not fit one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum NetworkError {
     /// A dimension is zero.

@@ -128,7 +128,7 @@ pub struct Statistics {
     pub frames_novel: u32,
     /// Longest time in µs of computing a frame's confidence.
     pub longest_confidence_us: u32,
-    /// Longest time of the same in cycles of the processor; 0 on a board that does not count them.
+    /// Longest time of computing a frame's confidence, in cycles of the processor; 0 on a board that does not count them.
     pub longest_confidence_cycles: u32,
     /// Longest time in µs from the start of a scan until the board's line took the last byte of its estimate. What the
     /// line holds back, such as a ring of bytes, is still to be sent then.
@@ -136,7 +136,7 @@ pub struct Statistics {
 }
 
 impl Statistics {
-    /// Counts a scanned frame; returns its number. Behind the largest comes 0.
+    /// Counts a scanned frame; returns its number. The largest is followed by 0.
     pub fn number_frame(&mut self) -> u32 {
         self.frames_scanned = self.frames_scanned.wrapping_add(1);
         self.frames_scanned

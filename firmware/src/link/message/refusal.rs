@@ -25,9 +25,9 @@ pub enum Refusal {
         /// Largest blob that fits, in bytes.
         slot_bytes: u32,
     },
-    /// A chunk or a trial was asked for without a begin, or a confirmation without a trial.
+    /// A chunk or a trial was requested without a begin, or a confirmation without a trial.
     NoUpload,
-    /// A chunk leaves a gap, is not a multiple of four, or goes beyond the announced length; or a trial was asked for
+    /// A chunk leaves a gap, is not a multiple of four, or goes beyond the announced length; or a trial was requested
     /// before all bytes were received.
     OutOfPlace {
         /// Number of bytes received from the start without a gap: the offset of the next chunk.
@@ -90,7 +90,7 @@ pub enum ConfigurationField {
     Slip,
 }
 
-/// Fault of an uploaded blob; `taxel inspect` says more about the file itself.
+/// Fault of an uploaded blob; `taxel inspect` shows more about the file itself.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum ModelFault {
     /// The bytes do not start as a blob does, or the blob is of another version.

@@ -31,11 +31,11 @@ pub struct Configuration {
     pub send_readings: bool,
     /// Whether every scan's estimate is sent.
     pub send_estimates: bool,
-    /// What of the model's confidence is computed for every scan, and sent with its estimate.
+    /// Parts of the model's confidence that are computed for every scan, and sent with its estimate.
     pub confidence: ConfidenceSent,
-    /// A reading below this in Ω is taken for a short circuit.
+    /// A reading below this in Ω counts as a short circuit.
     pub shorted_below_ohm: f32,
-    /// A reading above this in Ω is taken for a broken wire.
+    /// A reading above this in Ω counts as a broken wire.
     pub open_above_ohm: f32,
     /// Smallest relative change against the baseline that sets [`EstimateReport::CONTACT`](super::EstimateReport::CONTACT).
     pub contact_threshold: f32,
@@ -55,7 +55,7 @@ pub struct Configuration {
     pub slip_mm_per_s: f32,
 }
 
-/// What is sent of a model's confidence, by its [reading model](taxel_core::reading_model), with the estimate of a scan. An answer to
+/// Parts of a model's confidence that are sent, by its [reading model](taxel_core::reading_model), with the estimate of a scan. An answer to
 /// [`Request::Decode`](super::Request::Decode) has all of it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub enum ConfidenceSent {
