@@ -314,7 +314,7 @@ pub static MODEL: taxel_core::Fixed<rbf::Network<'static>, 2, 18, 18, 73> = taxe
 }
 .checked();
 
-/// Decodes a frame of readings, row after row. One that is not finite is missing.
+/// Decodes a frame of readings, row after row. A reading that is not finite is missing.
 #[must_use]
 pub fn decode(readings: &[[f32; 18]; 2]) -> taxel_core::Decoded<2, 18> {
     MODEL.decode(readings, None)

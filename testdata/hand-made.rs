@@ -141,7 +141,7 @@ pub static MODEL: taxel_core::Fixed<rbf::float32::Network<'static>, 8, 18, 18, 1
 }
 .checked();
 
-/// Decodes a frame of readings, row after row. One that is not finite is missing.
+/// Decodes a frame of readings, row after row. A reading that is not finite is missing.
 #[must_use]
 pub fn decode(readings: &[[f32; 18]; 8]) -> taxel_core::Decoded<8, 18> {
     MODEL.decode(readings, None)

@@ -106,7 +106,7 @@ pub static MODEL: taxel_core::Fixed<rbf::float32::Network<'static>, 1, 18, 6, 18
 }
 .checked();
 
-/// Decodes a frame of readings, row after row. One that is not finite is missing.
+/// Decodes a frame of readings, row after row. A reading that is not finite is missing.
 #[must_use]
 pub fn decode(readings: &[[f32; 18]; 1]) -> taxel_core::Decoded<1, 6> {
     MODEL.decode(readings, None)

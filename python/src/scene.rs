@@ -66,7 +66,7 @@ impl Scene {
                 let inner = place.entry(name).or_insert_with(|| Value::Table(Table::new()));
                 place = inner
                     .as_table_mut()
-                    .ok_or_else(|| refused(format!("{name} is no table of the scene")))?;
+                    .ok_or_else(|| refused(format!("{name} is not a table of the scene")))?;
             }
             place.insert(last.into(), value);
         }

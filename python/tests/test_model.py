@@ -268,7 +268,7 @@ def test_a_baseline_is_one_reading_above_zero_for_each_input():
 def test_what_a_model_cannot_take_is_told_in_the_words_of_python(tmp_path):
     x, y = smooth()
     for parameters, says in [
-        ({"centres": 1.5}, "centres=1.5: give a whole number from 1"),
+        ({"centres": 1.5}, "centres=1.5: give a whole number, 1 or above"),
         ({"centres": "16"}, "centres='16'"),
         ({"format": "float16"}, 'format=\'float16\': give "f32"'),
         ({"grid": 12}, "grid=12: give rows and columns"),
@@ -280,7 +280,7 @@ def test_what_a_model_cannot_take_is_told_in_the_words_of_python(tmp_path):
         with pytest.raises(ValueError, match=says):
             taxel.Model(4, refine=False, penalty=1e-6).fit(x, y, groups=groups)
     x[3, 1] = np.nan
-    with pytest.raises(ValueError, match="NaN: missing readings take Model"):
+    with pytest.raises(ValueError, match="NaN: missing readings need Model"):
         taxel.Model(4, refine=False).fit(x, y)
     with pytest.raises(TypeError, match="a ndarray: give a Scene"):
         taxel.trade(x)

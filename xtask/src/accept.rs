@@ -177,7 +177,7 @@ fn accept(board: &mut Board, options: &Options, toolchain: &Toolchain) -> Outcom
     let found = device.while_paused(Device::diagnose).map_err(text)?;
     record.add(readout::stages(&found));
     if !record.is_right() {
-        println!("the readout is not right: nothing else is tried");
+        println!("the readout is faulty: nothing else is tested");
         return Ok(record);
     }
     let seconds = options.stream.unwrap_or(if options.emulated { 2 } else { 60 });
@@ -193,7 +193,7 @@ fn accept(board: &mut Board, options: &Options, toolchain: &Toolchain) -> Outcom
         None => {}
     }
     if !record.is_right() {
-        println!("line or circuit are not right: nothing else is tried");
+        println!("the line or the circuit is faulty: nothing else is tested");
         return Ok(record);
     }
     let frames = Synthesis::new(&World::press()).frames(Stream::Test, FRAMES);
@@ -301,7 +301,7 @@ fn erase(device: &mut Device) -> Outcome<Stage> {
         return Err(format!("an upload begins with {begun:?}"));
     }
     let missed = device.statistics().map_err(text)?.frames_missed.wrapping_sub(missed_before);
-    let slow = "flash is erased in another time than the data sheet says: it is worn, or the supply is weak";
+    let slow = "erasing flash takes another time than in the data sheet: it is worn, or the supply is weak";
     Ok(Stage::within("erasing a slot, ms", missed * (PERIOD_US / 1000), [0, ERASE_MS], slow))
 }
 

@@ -92,11 +92,9 @@ fn prove_no_panic(toolchain: &Toolchain) -> Outcome {
         |feature, echo| watch(toolchain.build().args(PROFILE).args(NO_PANIC).arg(feature), echo);
     let Watched { messages, success } = link("no-panic", true)?;
     if names_symbol(&messages) {
-        return Err(
-            "a panic is reachable on the device; firmware/qemu/src/no_panic.rs tells how to \
-                    find it"
-                .into(),
-        );
+        return Err("a panic is reachable on the device; firmware/qemu/src/no_panic.rs describes \
+                    how to find it"
+            .into());
     }
     if !success {
         return Err("the firmware does not build".into());

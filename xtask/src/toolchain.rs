@@ -80,7 +80,7 @@ impl Toolchain {
             Source::Active => "rustc",
             Source::Debian { .. } => DEBIAN_RUSTC,
         };
-        first_line(rustc, &["--version"]).ok_or(format!("{rustc} does not tell its version"))
+        first_line(rustc, &["--version"]).ok_or(format!("{rustc} does not print its version"))
     }
 
     /// Command `cargo build` for the target, with a separate target directory.

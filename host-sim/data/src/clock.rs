@@ -235,7 +235,7 @@ mod tests {
         let refused = clock("n,a\n5,1\n4,2\n", Some("n")).unwrap_err().to_string();
         assert!(refused.contains("line 3") && refused.contains("4 is earlier than 5"), "{refused}");
         let refused = clock("n,a\n,1\n5,2\n", Some("n")).unwrap_err().to_string();
-        assert!(refused.contains("line 2: column \"n\": no time stands there"), "{refused}");
+        assert!(refused.contains("line 2: column \"n\": the time is missing"), "{refused}");
     }
 
     #[test]

@@ -256,7 +256,7 @@ mod tests {
                 .map_err(|why| why[..22].to_owned())
         };
         assert_eq!(of_grid(["r1c1_adc", "r2c7_adc"], "2x7").unwrap()[1], "r2c7_adc");
-        assert_eq!(of_grid(["r1c1_adc", "r2c7_adc"], "7x2"), Err("--grid 7x2: r2c7_adc t".into()));
+        assert_eq!(of_grid(["r1c1_adc", "r2c7_adc"], "7x2"), Err("--grid 7x2: r2c7_adc n".into()));
         assert_eq!(of_grid(["r1c1_adc", "r2c7_adc"], "none"), Err("--grid none: r1c1_adc ".into()));
         assert_eq!(of_grid(["r0c1", "r0c0"], "1x2").unwrap()[0], "r1c2_r0c1");
         assert_eq!(of_grid(["r0c1", "r0c0"], "none").unwrap()[0], "r0c1");

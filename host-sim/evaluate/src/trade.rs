@@ -464,7 +464,7 @@ pub fn impossible(
     let nearest = bounds::nearest(&known, best.iter());
     Ok(nearest.map(|(_, results)| {
         let bounds = bounds::in_words(&known);
-        format!("no point can be within {bounds}; the nearest is {results}, even even if decoding took no time; nothing was trained or written")
+        format!("no point can be within {bounds}; the nearest is {results}, even if decoding took no time; nothing was trained or written")
     }))
 }
 

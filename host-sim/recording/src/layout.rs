@@ -91,7 +91,7 @@ impl Extras {
         at_most(MOST_SETTINGS_BYTES as u64, bytes as u64, "bytes of settings")?;
         check_text("the parent frame", &self.parent_frame)?;
         if self.parent_frame.is_empty() || self.parent_frame == "taxel" {
-            return Err(Error::layout(format!("{:?} is no parent frame", self.parent_frame)));
+            return Err(Error::layout(format!("{:?} is not a parent frame", self.parent_frame)));
         }
         Ok(())
     }
@@ -136,7 +136,7 @@ impl Layout {
                 let unit = outputs.get(output).map(|column| column.unit.as_str());
                 if unit != Some("mm") {
                     let rule =
-                        format!("electrode {name}: output {} is no column in mm", output + 1);
+                        format!("electrode {name}: output {} is not a column in mm", output + 1);
                     return Err(Error::layout(rule));
                 }
                 if std::mem::replace(&mut is_taken[output], true) {

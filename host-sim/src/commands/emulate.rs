@@ -24,7 +24,7 @@ const PATIENCE: Duration = Duration::from_mins(1);
 /// Decodes frames of a scene, or of a CSV file with a model of it. Fails (exit status 1) unless every frame is bit-identical.
 #[derive(Args)]
 #[command(
-    after_help = "Example: cargo xtask firmware && taxel emulate press -n 10000\n\nNeeds qemu-system-arm and the image; docs/board.md says how to get both."
+    after_help = "Example: cargo xtask firmware && taxel emulate press -n 10000\n\nNeeds qemu-system-arm and the image; docs/board.md describes how to get both."
 )]
 pub struct Arguments {
     #[command(flatten)]

@@ -132,7 +132,7 @@ fn work(
     let groups = shard.groups(points);
     let worked = work::run(plan, points, &groups, &store(folder), &Terminal::new(common))?;
     for replaced in &worked.replaced {
-        common.remark(format_args!("note: {replaced}; it is computed anew"));
+        common.remark(format_args!("note: {replaced}; it is computed again"));
     }
     Ok(worked)
 }

@@ -45,8 +45,7 @@ impl<'b> FrameByFrame<'b> {
     /// What is to be said while the model divides readings by a baseline, and has none yet.
     pub fn note(&self) -> Option<String> {
         let lacks = self.reciprocals.as_ref().is_some_and(|all| all.iter().all(|it| it.is_nan()));
-        let words =
-            "nothing is decoded yet: the model needs a baseline of the untouched sensor; zero it (b)";
+        let words = "nothing is decoded yet: the model needs a baseline of the untouched sensor; zero it (b)";
         lacks.then(|| words.into())
     }
 

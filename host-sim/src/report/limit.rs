@@ -377,7 +377,7 @@ fn known(result: &LimitResult, seen: &Observability) -> [Panel; 3] {
     ['x', 'y', 'z'].map(|letter| {
         let axis = usize::from(letter as u8 - b'x');
         let of_cells: Vec<f64> = seen.electrodes.iter().map(|e| e.known[axis]).collect();
-        let title = format!("Map over the face of what the readings tell about Δ{letter}");
+        let title = format!("Map over the face of what the readings show about Δ{letter}");
         let (label, scale) = ("share of the prior's variance", &ColourScale::of_shares());
         let shown = 3 * result.levels.len();
         let values = Values { of_cells: &of_cells, scale, label, unit: "", shown };

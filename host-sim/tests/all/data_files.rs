@@ -30,7 +30,7 @@ fn a_log_in_another_dialect_trains_the_same_model() {
         folder.notes(&[&train[..], &["-o", "m.bin"], more].concat())
     };
     let said = train("log.csv", &["--inputs", "c2..c3", "--outputs", "c4"]);
-    assert!(said.contains("log.csv names no columns: they are called c1 to c4 "), "{said}");
+    assert!(said.contains("log.csv has no column names: columns are called c1 to c4 "), "{said}");
     assert!(said.contains("20 values of log.csv are -1, and count as missing"), "{said}");
     folder.succeed(&["decode", "m.bin", "log.csv", "--keep", "c1,c2", "-o", "e.csv"]);
     let estimates = folder.read("e.csv");

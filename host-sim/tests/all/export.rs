@@ -99,7 +99,7 @@ fn an_export_to_c_is_a_whole_library_with_the_given_name() {
     assert!(text("src/mat.c").starts_with("/* Model ") && text("notes.txt") == "mine");
     // Neither the user's own files nor another library's are replaced or mixed with.
     let said = folder.fail(&["export", &blob, "--c", "lib/mat", "--name", "sole"], 2);
-    assert!(said.contains("lib/mat: it holds other files than a library sole"), "{said}");
+    assert!(said.contains("lib/mat: it has files that are not of library sole"), "{said}");
     fs::create_dir(folder.path("own")).unwrap();
     fs::write(folder.path("own/README.md"), "mine").unwrap();
     folder.fail(&["export", &blob, "--c", "own", "--name", "mat"], 2);

@@ -92,7 +92,7 @@ fn places_that_are_logged_in_pauses_count_as_missing() {
     assert!((x(&idle) / x(&empty) - 1.0).abs() < 0.2, "{} {}", x(&idle), x(&empty));
     let output = folder.run(&[&["run", "idle.csv"], &COLUMNS[..]].concat());
     let notes = String::from_utf8(output.stderr).unwrap();
-    let says = "lines of idle.csv nothing touches: the place there (x_mm) counts as missing";
+    let says = "lines of idle.csv: the position there (x_mm) counts as missing";
     assert_eq!(notes.matches(says).count(), 1, "{notes}");
 }
 

@@ -35,7 +35,7 @@ fn help_says_what_holds_for_its_command() {
     }
     let synth = help(&["synth"]);
     assert!(!synth.contains(repeated) && !synth.contains(readings), "{synth}");
-    let decodes = "decodes what nobody has decoded";
+    let decodes = "decodes frames that are not decoded yet";
     assert!(help(&["view"]).contains(decodes));
     assert!(!help(&["link", "port", "baseline"]).contains(decodes));
     // An option that is refused.

@@ -3,7 +3,7 @@
 use crate::common::{Folder, small_scene};
 
 const NOTE: &str =
-    "lie outside of 5 to 1000 Ω: a device, `decode` and `eval` take them for missing";
+    "lie outside of 5 to 1000 Ω: a device, `decode` and `eval` treat them as missing";
 
 #[test]
 fn training_tells_of_readings_that_a_device_would_refuse() {

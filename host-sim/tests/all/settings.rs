@@ -106,7 +106,7 @@ fn a_board_is_set_up_from_the_command_line_and_stays_so() {
     for said in [
         "a scan every 20000 µs, 55 µs settling, 4 samples a reading",
         "outputs with a time constant of 30 ms, a lead of 4 ms",
-        "tracked by a model that can: no, with a lead of 4 ms",
+        "tracked if the model has a tracker: no, with a lead of 4 ms",
         "readings yes, estimates yes (one of 3), of confidence nothing",
         "shorted below 5 Ω, open above 1000 Ω, contact from 0.05",
         "constants: kept",

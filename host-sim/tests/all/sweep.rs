@@ -156,7 +156,8 @@ fn another_plan_does_not_take_old_results() {
     let out = folder.run(&["sweep", "plan.toml"]);
     let remarks = String::from_utf8_lossy(&out.stderr).into_owned();
     assert!(
-        out.status.success() && remarks.contains("2 files in out/tiny/points, of no point"),
+        out.status.success()
+            && remarks.contains("2 files in out/tiny/points, which belong to no point"),
         "{remarks}"
     );
     let new = folder.read("out/tiny/results.csv");
@@ -369,7 +370,7 @@ fn measurements_are_swept_by_the_settings_of_training() {
         (
             "training.centres",
             "data.folds",
-            "data.folds = 4: points of the same data differ in data.fold",
+            "data.folds = 4: points of the same data may differ only in data.fold",
         ),
     ] {
         folder.write("plan.toml", plan.replace(from, to));
@@ -379,7 +380,7 @@ fn measurements_are_swept_by_the_settings_of_training() {
     folder
         .write("plan.toml", "name = \"folds\"\nscene = \"scene.toml\"\n[axes]\ndata.fold = [0]\n");
     let message = folder.fail(&["sweep", "plan.toml"], 2);
-    assert!(message.contains("data.fold = 0: a scene is judged by fresh frames"), "{message}");
+    assert!(message.contains("data.fold = 0: a scene is evaluated on new frames"), "{message}");
 }
 
 #[test]

@@ -66,7 +66,7 @@ impl Board {
         command.arg("serve").stdout(Stdio::piped());
         let mut emulator =
             command.spawn().map_err(|cause| format!("the emulated board: {cause}"))?;
-        let said = emulator.stdout.take().ok_or("the emulated board says nothing")?;
+        let said = emulator.stdout.take().ok_or("the emulated board prints nothing")?;
         let mut lines = BufReader::new(said).lines().map_while(Result::ok);
         let port = lines
             .find_map(|line| line.split_once(PORT)?.1.split_whitespace().next().map(str::to_owned));
@@ -116,7 +116,7 @@ fn flash(image: &Path) -> Outcome {
         }
         run(&mut command).map_err(|cause| {
             format!(
-                "{cause}; flashing takes probe-rs (docs/board.md), or flash the image yourself and say --flashed"
+                "{cause}; flashing takes probe-rs (docs/board.md), or flash the image yourself and give --flashed"
             )
         })?;
     }

@@ -66,7 +66,7 @@ fn cause_of(errors: &[f32], columns: usize) -> Option<String> {
     let (row, column) = (first / columns, first % columns);
     if errors.iter().filter(is_off).count() == errors.len() {
         return Some(
-            "every reading is off: V_b, R_f or the resistors are not as the constants say".into(),
+            "every reading is off: V_b, R_f or the resistors do not match the constants".into(),
         );
     }
     if errors.chunks(columns).nth(row)?.iter().all(|error| is_off(&error)) {
@@ -100,7 +100,7 @@ pub fn sensor(device: &mut Device) -> Outcome<Vec<Stage>> {
     heard.map_err(text)?;
     device.resume().map_err(text)?;
     let missing = frames.iter().flatten().filter(|reading| !reading.is_finite()).count();
-    let torn = "a wire is torn or a contact loose: `taxel link … record` tells which reading";
+    let torn = "a wire is torn or a contact loose: `taxel link … record` shows which reading";
     let mut noise: Vec<f64> = (0..frames.first().map_or(0, Vec::len))
         .map(|cell| scatter(frames.iter().map(|frame| frame[cell])))
         .filter(|share| share.is_finite())

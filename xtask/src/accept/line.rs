@@ -65,9 +65,9 @@ pub fn stream(device: &mut Device, seconds: u32, baud: u32) -> Outcome<Vec<Stage
     let sent = last.0.wrapping_sub(first.0) + 1;
     let lost = sent - frames.len() as u32;
     let of_line = if unsent > 0 {
-        "the board could not send in time: the line or the computer is too slow. Say a lower --baud"
+        "the board could not send in time: the line or the computer is too slow. Give a lower --baud"
     } else {
-        "the line loses bytes: update the ST-LINK's firmware, take another cable, or say a lower --baud"
+        "the line loses bytes: update the ST-LINK's firmware, take another cable, or give a lower --baud"
     };
     let cause = (lost > 0 || damaged > 0).then_some(of_line);
     let measured = format!("{lost} of {sent} lost, {damaged} damaged");

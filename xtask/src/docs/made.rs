@@ -148,7 +148,7 @@ pub fn again(run: &Run, accept: bool) -> Outcome<Vec<String>> {
             if accept {
                 fs::write(&old, bytes).map_err(|cause| format!("{}: {cause}", old.display()))?;
             } else {
-                faults.push(format!("{} is no more what {} makes", picture.file, run.name));
+                faults.push(format!("{} differs from what {} makes", picture.file, run.name));
             }
         }
     }

@@ -149,7 +149,9 @@ fn check_stagger(
         format!("give 1 for electrodes in line, or up to the number of the layer's wires, {wires}")
     })?;
     require(stagger == 1 || listed.is_none(), &field, stagger, || {
-        format!("sensor.{layer}_electrodes_mm says where each electrode is; give one of the two")
+        format!(
+            "sensor.{layer}_electrodes_mm lists the position of each electrode; give one of the two"
+        )
     })
 }
 

@@ -335,10 +335,10 @@ impl Plan {
             Some(base) if is_wrong(&base.document) => (
                 "scene",
                 base.label.clone(),
-                "; `compare` takes a scene with lists, and in a plan they stand in [axes]",
+                "; `compare` takes a scene with lists, and in a plan they belong in [axes]",
             ),
             _ if self.changed(base, vec![]).is_ok_and(|it| is_wrong(&it.scene)) => {
-                ("set", in_words(&self.set), "; several values stand in [axes]")
+                ("set", in_words(&self.set), "; several values belong in [axes]")
             }
             _ => ("axes", in_words(&document.values), ""),
         };

@@ -37,12 +37,15 @@ fn a_model_that_has_learnt_nothing_is_called_that() {
     let verdict = Verdict::new(&all, &no_limit());
     assert_eq!(
         verdict.sentence,
-        "The model has learnt next to nothing of dx_mm and dy_mm: it is no better than always predicting the mean."
+        "The model has learnt almost nothing about dx_mm and dy_mm: it is no better than always predicting the mean."
     );
     assert_eq!(names(&verdict), ["no-gain-over-mean"]);
     all[0].errors.iter_mut().for_each(|group| group.ratio_to_limit = Some(1.02));
     let sentence = Verdict::new(&all, &no_limit()).sentence;
-    assert!(sentence.ends_with("no decoder could be better by more than 2 %."), "{sentence}");
+    assert!(
+        sentence.ends_with("No decoder of these readings could be better by more than 2 %."),
+        "{sentence}"
+    );
 }
 
 #[test]
@@ -104,9 +107,21 @@ fn a_verdict_tells_gains_and_losses_over_mean_and_linear() {
         ([0.6, 0.3], [1.0, 1.0], [0.5, 0.25], worse, ", and 20 % above the best linear"),
         ([0.25, 0.25], [1.0, 1.0], [0.5, 0.5], "", ": 75 % below always predicting"),
         ([0.0, 0.1], [0.0, 1.0], [0.0, 0.3], "", "f_n does not change in these frames"),
-        ([missing, 0.1], [missing, 1.0], [missing, 0.3], "", "f_n has no frame to judge by"),
-        ([0.95, 0.86], [1.0, 1.0], [1.0, 1.0], "", "of f_n and g_n: at best 14 % below"),
-        ([0.86, 0.1], [1.0, 1.0], [1.0, 0.3], "", "It tells little of f_n: at best 14 % below"),
+        ([missing, 0.1], [missing, 1.0], [missing, 0.3], "", "f_n has no test frame"),
+        (
+            [0.95, 0.86],
+            [1.0, 1.0],
+            [1.0, 1.0],
+            "",
+            "about f_n and g_n: its error is at best 14 % below",
+        ),
+        (
+            [0.86, 0.1],
+            [1.0, 1.0],
+            [1.0, 0.3],
+            "",
+            "It has learnt little about f_n: its error is at best 14 % below",
+        ),
     ] {
         let (found, sentence) = says(network, mean, linear);
         assert!(found == warning && sentence.contains(part), "{found}: {sentence}");
@@ -193,7 +208,7 @@ fn averaging_within_a_time_constant_is_warned_of() {
     // White noise of 16 samples has a quarter of one's, so that both have 0.73 of it; of eight, 0.75.
     let (name, text) = warning(&noise, 16, 36e-6).unwrap();
     assert_eq!(name, "averaging-does-not-pay");
-    assert!(text.contains("the mean of 16 samples has 0.726 of one sample's noise"), "{text}");
+    assert!(text.contains("the mean of 16 samples has 0.726 of the noise of one sample"), "{text}");
     assert_eq!(warning(&noise, 2, 36e-6), None);
     assert_eq!(warning(&noise, 1, 36e-6), None);
     assert_eq!(warning(&noise, 16, 0.1), None);

@@ -213,7 +213,7 @@ fn filled_readings_are_as_near_as_noise_lets_them_be() {
 #[test]
 fn readings_that_are_too_few_or_no_numbers_are_refused_by_name() {
     let says = |refused: Result<()>| refused.unwrap_err().to_string();
-    assert!(says(check(359, 36)).contains("frames = 359: a reading model takes at least 360"));
+    assert!(says(check(359, 36)).contains("frames = 359: a reading model needs at least 360"));
     assert!(check(360, 36).is_ok() && check(20, 1).is_ok() && check(19, 1).is_err());
     let mut bad = model().1.clone();
     bad.values[0] = f64::INFINITY;

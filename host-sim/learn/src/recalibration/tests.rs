@@ -230,7 +230,7 @@ fn what_cannot_be_recalibrated_is_refused_by_name() {
     };
     let all: Vec<usize> = (0..80).collect();
     for (lines, factor, says) in [
-        (&all[..9], 1.0, "network 1 of 2 has seen fewer than 10 presses"),
+        (&all[..9], 1.0, "network 1 of 2 has fewer than 10 presses"),
         (&[1; 80], 1.0, "too similar"),
         // Nothing has drifted, or outputs are in another unit.
         (&all, 1.0, "no better model"),

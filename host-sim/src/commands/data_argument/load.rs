@@ -38,7 +38,7 @@ impl DataOptions {
         let cells = MatCells::of(&file, inputs, self.grid)?;
         if let Some(mat) = cells.found.filter(|_| self.grid.is_none()) {
             common.remark(format_args!(
-                "note: inputs are taken for a mat of {mat} wires, row by row (--grid none: they are not)"
+                "note: inputs are read as a mat of {mat} wires, row by row (--grid none if they are not)"
             ));
         }
         for wire in cells.silent_wires(&unused.names()) {
@@ -60,7 +60,7 @@ impl DataOptions {
             return Err(Error::Unfit { path: path.into(), message: message.into() });
         }
         if test.frames.frames() == 0 && !matches!(judged, JudgedBy::None) {
-            let message = "there is no frame to judge by: give five lines or more, or --test FILE";
+            let message = "there are no test frames: give five lines or more, or --test FILE";
             return Err(Error::Unfit { path: path.into(), message: message.into() });
         }
         let training = all.subset(&kept);
@@ -158,7 +158,7 @@ impl DataOptions {
         let (mut frames, kept) = Dataset::from_file(file, chosen).map_err(with_options)?;
         data_notes::print_left_out(&kept.left_out, &path, kept.of, common);
         let outliers = self.outliers(&frames, |frame| kept.numbers[frame]);
-        let left_out = "training and judging (--keep-outliers keeps them)";
+        let left_out = "training and evaluation (--keep-outliers keeps them)";
         data_notes::print_outliers(&outliers, &path, frames.frames(), left_out, common);
         frames.keep(&outliers.kept);
         refused_readings::note(&frames.inputs, &path.display().to_string(), common);
@@ -208,7 +208,7 @@ impl DataOptions {
         let cells = MatCells::of(&file, self.inputs.as_deref(), self.grid)?;
         let own = self.usual_frames(file, (unused, &cells), None, relative_inputs, common)?;
         if own.digest == digest {
-            let message = "it is the file that is trained on, which would flatter the model: give other frames (--test)";
+            let message = "it is the training file, so errors would look too small: give other frames (--test)";
             return Err(Error::Unfit { path: path.into(), message: message.into() });
         }
         let own = own.all;

@@ -234,10 +234,10 @@ fn words_for_missing_values_and_unnamed_columns_are_recognised() {
     assert_eq!(file.header, ["c1", "a", "c3"]);
     assert!((0..3).all(|line| file.value(line, 1).is_nan()) && file.not_numbers.is_empty());
     let refused = parse(path, b",c1\n1,2\n", false).unwrap_err().to_string();
-    assert!(refused.contains("header: column \"c1\" stands twice"), "{refused}");
+    assert!(refused.contains("header: column \"c1\" appears twice"), "{refused}");
 }
 
-/// Texts of several dialects with a byte flipped, cut short, or with a part that stands twice.
+/// Texts of several dialects with a byte flipped, cut short, or with a part that appears twice.
 #[test]
 fn a_damaged_file_is_refused_or_read_to_finite_numbers() {
     let sound: [&[u8]; 4] = [

@@ -245,7 +245,9 @@ fn a_mix_has_the_ranges_of_all_parts_and_refuses_other_motions() {
     assert!(refused(mix([1.0, -1.0])).contains("deformation.parts (2).weight = -1.0"));
     let mut nested = mix([1.0, 1.0]);
     nested.parts[0].deformation = mix([1.0, 1.0]).into();
-    assert!(refused(nested).contains("deformation.parts (1).kind = mix: a mix is of contacts"));
+    assert!(
+        refused(nested).contains("deformation.parts (1).kind = mix: a mix consists of contacts")
+    );
     let mut bad = mix([1.0, 1.0]);
     bad.parts[1].deformation = dent(Profile::Punch, &[2.0, -1.0]).into();
     assert!(refused(bad).contains("deformation.parts (2).decay_mm (low) = -1.0"));
