@@ -28,7 +28,7 @@ use dent::Form;
 use linear::{Square, cholesky, dot, solve_lower, solve_upper};
 use walk::Vector;
 
-pub use readings::{Frame, Sizes, TERMS};
+pub use readings::{Frame, MOST_ELECTRODES, Sizes, TERMS};
 pub use walk::{LATENTS, Latents, NUMBERS, RATES, Settings};
 
 /// Most corrections by a frame that follows another, and by the first one.

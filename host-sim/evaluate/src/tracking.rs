@@ -1,15 +1,16 @@
 //! The tracker of a scene: how its contacts move, and what they do to its readings.
 
-use taxel_core::track::{LATENTS, Settings, Sizes, Tracker};
+use taxel_core::track::{LATENTS, MOST_ELECTRODES, Settings, Sizes, Tracker};
 use taxel_data::BadValue;
 use taxel_learn::ModelBlob;
 use taxel_learn::tracked::Shares;
 use taxel_simulate::World;
 use taxel_simulate::motion::Dent;
+use taxel_simulate::outputs::{ElectrodeOutputs, Outputs, Quantity};
 use taxel_simulate::path::Path;
-use taxel_simulate::sensor::{Sensor, Vector3, node};
+use taxel_simulate::sensor::{Axis, Sensor, Vector3, node};
 
-use crate::error::Result;
+use crate::error::{Error, Result};
 
 /// Depths, directions and ratios of shear at which a reading's change is fitted.
 const DEPTHS: usize = 12;
@@ -31,11 +32,45 @@ const FORM_DRIFT: f64 = 0.01;
 /// Standard deviation of a contact's form at the start (ln a/2, b, ln p), and the largest of each.
 const FORM: [[f64; 2]; 3] = [[0.25, 0.6], [0.2, 0.6], [0.2, 0.9]];
 
+/// Checks that contacts of this world can be tracked.
+///
+/// # Errors
+/// [`Error`](crate::Error) for a motion without a single contact, and outputs that are not the deformation along z or along
+/// x, y and z of each electrode.
+pub fn check(world: &World) -> Result<()> {
+    if world.motion.as_press().is_none() {
+        return Err(refused(NO_CONTACT));
+    }
+    let is_tracked = match &world.outputs {
+        Outputs::Electrodes(ElectrodeOutputs { quantity, axes }) => {
+            *quantity == Quantity::Deformation && (axes.as_slice() == [Axis::Z] || axes.len() == 3)
+        }
+        Outputs::Contact(_) => false,
+    };
+    if !is_tracked {
+        return Err(refused(
+            "a tracker predicts deformations along z, or along x, y and z: choose these outputs, or leave track out",
+        ));
+    }
+    if world.sensor.electrodes_per_row_wire > MOST_ELECTRODES {
+        return Err(refused(format!("a tracker has at most {MOST_ELECTRODES} electrodes a row")));
+    }
+    Ok(())
+}
+
+const NO_CONTACT: &str =
+    "a tracker follows one contact, and this scene's deformation has none: leave track out";
+
+fn refused(rule: impl Into<String>) -> Error {
+    BadValue::new("training.track", true, rule).into()
+}
+
 /// The model in `blob` with the tracker of this world.
 ///
 /// # Errors
-/// [`Error`](crate::Error) for a motion without a single contact, and outputs that are no deformations.
+/// As those of [`check`].
 pub fn add(blob: &ModelBlob, world: &World) -> Result<ModelBlob> {
+    check(world)?;
     let sensor = &world.sensor;
     let sizes = Sizes {
         rows: world.read_rows.len(),
@@ -43,16 +78,9 @@ pub fn add(blob: &ModelBlob, world: &World) -> Result<ModelBlob> {
         columns: sensor.column_wires,
         span: span(sensor),
     };
-    let shape = blob.parse().shape();
-    let fits = [shape.rows, shape.inputs] == [sizes.rows, sizes.columns];
-    if !fits || !sizes.has_outputs(shape.outputs) {
-        let rule = "a tracker needs outputs that are deformations, along z or along x, y and z; leave one of them out";
-        return Err(BadValue::new("training.track", true, rule).into());
-    }
     let block = block(world, sizes)?;
-    let tracker = Tracker::new(sizes, &block).map_err(|cause| {
-        BadValue::new("training.track", true, format!("the scene gives no tracker: {cause}"))
-    })?;
+    let tracker = Tracker::new(sizes, &block)
+        .map_err(|cause| refused(format!("the scene gives no tracker: {cause}")))?;
     Ok(blob.with_tracker(tracker)?)
 }
 
@@ -66,10 +94,7 @@ fn span(sensor: &Sensor) -> usize {
 /// The tracker's floats.
 fn block(world: &World, sizes: Sizes) -> Result<Vec<f32>> {
     let sensor = &world.sensor;
-    let Some(press) = world.motion.as_press() else {
-        let rule = "a tracker follows one contact, and the scene's deformation has none";
-        return Err(BadValue::new("training.track", true, rule).into());
-    };
+    let press = world.motion.as_press().ok_or_else(|| refused(NO_CONTACT))?;
     let settings = settings(world, &press);
     let deformations = deformations(press.dent_depth_mm[1], press.shear_ratio[1]);
     let shares = Shares::new(&deformations);

@@ -159,8 +159,12 @@ impl<'s> TrainingSet<'s> {
     /// Checks before long work that the model can have the reading model that is asked for.
     ///
     /// # Errors
-    /// [`Error`](crate::Error) for too few frames, or outputs whose squared errors are beyond f32.
+    /// [`Error`](crate::Error) for too few frames, outputs whose squared errors are beyond f32, or a scene that gives no
+    /// tracker.
     pub fn check(&self) -> Result<()> {
+        if let (More::Scene(more), true) = (&self.more, self.track) {
+            tracking::check(&more.experiment.world)?;
+        }
         if self.reading_model.is_some() {
             reading_model::check(self.frames.fewest_values(), self.frames.inputs.names.len())?;
         }

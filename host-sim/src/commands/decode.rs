@@ -117,6 +117,9 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<print::Outcome>
         Some(Ok(start_us)) => {
             let (start_us, baseline) = (&start_us[..], baseline.as_deref());
             let series = Series { start_us, faulty: &health.faulty, baseline };
+            if is_tracked {
+                common.remark("note: the model's tracker follows the contact");
+            }
             decode_series(&model, &readings, series, settings)
         }
         Some(Err(cause)) if !is_tracked => return Err(cause),

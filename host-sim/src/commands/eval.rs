@@ -62,6 +62,11 @@ pub fn execute(arguments: &Arguments, common: &Common) -> Result<print::Outcome>
         print::check_output(html, &[&*arguments.model, &arguments.data, untouched])?;
     }
     let blob = ModelBlob::read(&arguments.model)?;
+    if blob.parse().tracker().is_some() {
+        common.remark(
+            "note: each line is judged by itself, without the model's tracker: `run` judges it",
+        );
+    }
     let mut file = arguments.file.read(&arguments.data, common)?;
     let mut sections = judged(arguments, &blob, &mut file, common)?;
     if let Some(html) = &arguments.html {

@@ -152,14 +152,19 @@ fn costs(result: &mut Sections, blob: &ModelBlob, model: &Model<'_>, design: &De
         json!({ "rows": rows, "columns": columns, "mean_us": mean_us, "longest_us": longest_us })
     });
     result.value("scan", &summary);
-    let cost = Cost::of_frame(design);
-    result.value("frame_cost", &cost);
-    let Cost { instructions, cycles } = cost;
-    let us = cycles as f64 / BOARD_CLOCK_MHZ;
-    let text = format!(
-        "{instructions} instructions, {cycles} cycles ({us:.0} µs at {BOARD_CLOCK_MHZ} MHz)"
-    );
-    result.line("a frame", text);
+    let mut cost = |key: &'static str, name: &'static str, cost: Cost| {
+        result.value(key, &cost);
+        let Cost { instructions, cycles } = cost;
+        let us = cycles as f64 / BOARD_CLOCK_MHZ;
+        let text = format!(
+            "{instructions} instructions, {cycles} cycles ({us:.0} µs at {BOARD_CLOCK_MHZ} MHz)"
+        );
+        result.line(name, text);
+    };
+    cost("frame_cost", "a frame", Cost::of_frame(design));
+    if let Some(tracker) = model.tracker() {
+        cost("tracked_frame_cost", "a tracked frame", Cost::of_tracker(tracker.sizes()));
+    }
 }
 
 /// Why the images as they are cannot decode a `model`, with a blob of so many bytes, or not as it was trained.

@@ -42,6 +42,11 @@ impl<'b> FrameByFrame<'b> {
         Ok(Self { decoder, tracker, limits, reciprocals, scratch })
     }
 
+    /// Whether the model tracks a contact from frame to frame.
+    pub fn tracks(&self) -> bool {
+        self.tracker.is_some()
+    }
+
     /// What is to be said while the model divides readings by a baseline, and has none yet.
     pub fn note(&self) -> Option<String> {
         let lacks = self.reciprocals.as_ref().is_some_and(|all| all.iter().all(|it| it.is_nan()));

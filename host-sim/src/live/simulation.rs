@@ -128,6 +128,9 @@ impl<'b> SimulationFeed<'b> {
             scene.name,
             scene.world.noise.kind.in_words(scene.world.noise.total_level())
         );
+        // The limit is that of decoders without a memory.
+        let is_judged = has_truth && !decoder.tracks();
+        let judge = Judge::start(&scene.world, is_judged, in_mm)?;
         let mut feed = Self {
             layout,
             about: About { kind: Kind::Simulation, source, can, duration_s: None },
@@ -139,7 +142,7 @@ impl<'b> SimulationFeed<'b> {
             period: Duration::from_secs_f64(1.0 / frame_rate),
             due: Instant::now(),
             has_truth,
-            judge: Judge::start(&scene.world, has_truth, in_mm)?,
+            judge,
             at_rest,
             baseline,
         };
@@ -266,8 +269,9 @@ struct Judge {
 }
 
 impl Judge {
-    /// A judge by the limit of still frames of `world`, of those outputs that are deformations, `in_mm`; it does nothing if there is no limit, or no truth.
-    fn start(world: &World, has_truth: bool, in_mm: Vec<bool>) -> Result<Self> {
+    /// A judge by the limit of still frames of `world`, of those outputs that are deformations, `in_mm`; it does nothing unless
+    /// they are judged, and without a limit.
+    fn start(world: &World, is_judged: bool, in_mm: Vec<bool>) -> Result<Self> {
         let (sums, last) = (Arc::<Mutex<Sums>>::default(), Instant::now());
         let still = World { path: None, ..world.clone() };
         let Ok(limit) = Limit::new(&still) else { return Ok(Self { sender: None, sums, last }) };
@@ -289,7 +293,7 @@ impl Judge {
                 sums.squares_mm2[1] += decoded;
             }
         })?;
-        Ok(Self { sender: has_truth.then_some(sender), sums, last })
+        Ok(Self { sender: is_judged.then_some(sender), sums, last })
     }
 
     /// Judges this frame, if it is time to, and the one before is done.

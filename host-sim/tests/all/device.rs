@@ -311,6 +311,12 @@ pub mod serial_port {
         let counted = ["frames", "frames_lost", "values_missing", "frames_novel"];
         assert_eq!(counted.map(|key| found[key].as_u64()), [8, 0, 0, 0].map(Some), "{json}");
         folder.succeed(&[&record[..], &["--readings"]].concat());
+        // Without a period of its own, a recording has the one that the device keeps.
+        folder.succeed(&["link", &port, "configure", "--period-us", "20000"]);
+        let slow = ["link", &port, "record", "model.bin", "-n", "8", "-o", "slow.csv", "--json"];
+        let found: serde_json::Value = serde_json::from_str(&folder.succeed(&slow)).unwrap();
+        let frames_per_s = found["frames_per_s"].as_f64().unwrap();
+        assert!((40.0..51.0).contains(&frames_per_s), "{found}");
         let decode = ["decode", "model.bin", "log.csv", "-o", "estimate.csv"];
         folder.succeed(&[&decode[..], &["--filter-ms", "30", "--lead-ms", "4"]].concat());
         let read = |name: &str| {

@@ -9,7 +9,7 @@ use clap::Args;
 use taxel_core::blob::Model;
 use taxel_core::health::Limits;
 use taxel_data::{DataFile, Table, columns};
-use taxel_firmware::link::message::{Configuration, Refusal};
+use taxel_firmware::link::message::Refusal;
 use taxel_learn::ModelBlob;
 use taxel_learn::health::judge;
 use taxel_learn::recalibration::{self, Recalibrated};
@@ -104,14 +104,15 @@ fn record_presses(
     scan: &ScanArguments,
     common: &Common,
 ) -> Result<Table> {
-    let (names, patience) =
-        (reading_names(identity, Some(model))?, patience_for_next(scan, identity, 1));
+    let names = reading_names(identity, Some(model))?;
+    let configuration = scan.configuration(device)?;
+    let patience = patience_for_next(&configuration, identity);
     let mut values = Vec::new();
     for number in 0..outputs.len() {
         ask_for_press(number, outputs)?;
         // Paused first, so that no frame is from before the press.
         let scans = device.while_paused(|device| -> Result<_> {
-            configure(device, scan, Wanted::Readings, Configuration::DEFAULT)?;
+            configure(device, Wanted::Readings, configuration)?;
             hear_scans(
                 device,
                 scan.frames.into(),

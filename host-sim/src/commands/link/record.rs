@@ -144,26 +144,15 @@ pub fn record(
     if let Some(model) = &model {
         names.extend(confidence_names(model, confidence, &names)?);
     }
-    let every = action.reports.report_every.unwrap_or(1);
-    let patience = patience_for_next(&action.scan, &identity, every);
-    let filter = action.reports.filter.settings();
-    let own = device.configuration()?;
-    let decoding = Configuration {
-        contact_threshold: own.contact_threshold,
-        load_threshold: own.load_threshold,
-        slip_mm_per_s: own.slip_mm_per_s,
-        confidence: confidence.into(),
-        filter_time_constant_us: filter.time_constant_us,
-        filter_lead_us: filter.lead_us,
-        report_every: every,
-        track: action.reports.track.unwrap_or(true),
-        ..Configuration::DEFAULT
-    };
+    let own = Configuration { confidence: confidence.into(), ..action.scan.configuration(device)? };
+    let configuration = action.reports.over(own);
+    let every = configuration.report_every;
+    let patience = patience_for_next(&configuration, &identity);
     let mut recorder = is_recording(&action.to.output)
         .then(|| recorder(&action.to.output, &identity, &names[..outputs], blob))
         .transpose()?;
     let scans = device.while_paused(|device| -> Result<_> {
-        configure(device, &action.scan, wanted, decoding)?;
+        configure(device, wanted, configuration)?;
         let count = action.scan.frames.into();
         hear_scans(device, count, patience, wanted, names.len(), common, |scan| match &mut recorder
         {
@@ -191,7 +180,7 @@ pub fn record(
     let events = scans.iter().flat_map(|scan| scan.events.clone()).collect();
     let frames = scans.len();
     let saved = Saved { frames, frames_per_s, frames_lost, missing, frames_novel, events };
-    Ok(saved.outcome(&action.to.output, Some(action.scan.period_us()), common))
+    Ok(saved.outcome(&action.to.output, Some(configuration.frame_period_us), common))
 }
 
 /// A recording of what a device sends: of the model in `blob`, or of all its readings, called `names`.
@@ -266,9 +255,10 @@ pub fn baseline(
     let names = reading_names(&identity, model.as_ref())?;
     let frames = action.scan.frames;
     let request = Request::CaptureBaseline { frames };
-    let patience = patience(&action.scan, &identity);
+    let configuration = action.scan.configuration(device)?;
+    let patience = patience(frames, &configuration, &identity);
     let answer = device.while_paused(|device| {
-        configure(device, &action.scan, Wanted::Nothing, Configuration::DEFAULT)?;
+        configure(device, Wanted::Nothing, configuration)?;
         device.ask(&request, patience, |report| match report {
             Report::Baseline { readings_ohm } => {
                 Some(readings_ohm.iter().map(f64::from).collect::<Vec<_>>())

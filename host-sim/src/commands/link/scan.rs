@@ -67,10 +67,27 @@ pub struct ReportArguments {
     pub confidence: Option<Confidence>,
 }
 
+impl ReportArguments {
+    /// This configuration with what is given.
+    pub fn over(&self, mut c: Configuration) -> Configuration {
+        c.confidence = self.confidence.map_or(c.confidence, ConfidenceSent::from);
+        c.filter_time_constant_us = self.filter.filter_ms.unwrap_or(c.filter_time_constant_us);
+        c.filter_lead_us = self.filter.lead_ms.unwrap_or(c.filter_lead_us);
+        c.track = self.track.unwrap_or(c.track);
+        c.report_every = self.report_every.unwrap_or(c.report_every);
+        c
+    }
+}
+
 impl ScanArguments {
-    /// Time from one scan to the next that is asked for.
-    pub fn period_us(&self) -> u32 {
-        self.timing.over(Configuration::DEFAULT).frame_period_us
+    /// The configuration that the device keeps, with the times that are given. Every scan is reported, at the default period
+    /// if the device keeps none.
+    pub fn configuration(&self, device: &mut Device) -> taxel_rig::Result<Configuration> {
+        let mut own = Configuration { report_every: 1, ..device.resume()? };
+        if own.frame_period_us == 0 {
+            own.frame_period_us = Configuration::DEFAULT.frame_period_us;
+        }
+        Ok(self.timing.over(own))
     }
 }
 
@@ -114,37 +131,32 @@ impl From<Confidence> for ConfidenceSent {
     }
 }
 
-/// Activates a configuration for scanning, which decodes as `decoding` says.
+/// Activates a configuration in which what is `wanted` of each scan is sent.
 pub fn configure(
     device: &mut Device,
-    scan: &ScanArguments,
     wanted: Wanted,
-    decoding: Configuration,
+    configuration: Configuration,
 ) -> taxel_rig::Result<()> {
-    device.configure(Configuration {
-        send_readings: wanted.sent().readings,
-        send_estimates: wanted.sent().estimates,
-        ..scan.timing.over(decoding)
-    })
+    let Sent { readings: send_readings, estimates: send_estimates } = wanted.sent();
+    device.configure(Configuration { send_readings, send_estimates, ..configuration })
 }
 
 /// Longest time of a sample, with any converter that the readout is written for.
 const SLOWEST_SAMPLE_NS: u32 = 100_000;
 
-/// Time within which all frames must have come.
-pub fn patience(scan: &ScanArguments, identity: &DeviceIdentity) -> Duration {
-    Duration::from_secs(2) + 4 * u32::from(scan.frames) * longest_period(scan, identity)
+/// Time within which so many frames must have come.
+pub fn patience(frames: u16, configuration: &Configuration, identity: &DeviceIdentity) -> Duration {
+    Duration::from_secs(2) + 4 * u32::from(frames) * longest_period(configuration, identity)
 }
 
-/// Longest time without a frame, if one of `every` so many is sent. Some are lost where the line cannot carry all.
-pub fn patience_for_next(scan: &ScanArguments, identity: &DeviceIdentity, every: u16) -> Duration {
-    let periods = 40.max(4 * u32::from(every));
-    Duration::from_secs(3) + periods * longest_period(scan, identity)
+/// Longest time without a frame. Some are lost where the line cannot carry all.
+pub fn patience_for_next(configuration: &Configuration, identity: &DeviceIdentity) -> Duration {
+    let periods = 40.max(4 * u32::from(configuration.report_every));
+    Duration::from_secs(3) + periods * longest_period(configuration, identity)
 }
 
 /// Longest time from scan to scan.
-fn longest_period(scan: &ScanArguments, identity: &DeviceIdentity) -> Duration {
-    let configuration = scan.timing.over(Configuration::DEFAULT);
+fn longest_period(configuration: &Configuration, identity: &DeviceIdentity) -> Duration {
     let plan = ScanPlan {
         rows: identity.rows as u16,
         columns: identity.columns as u16,

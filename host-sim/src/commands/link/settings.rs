@@ -39,21 +39,15 @@ pub struct ConfigureArguments {
 impl ConfigureArguments {
     /// This configuration with the fields that are given.
     fn changed(&self, c: Configuration) -> Configuration {
-        let mut c = self.timing.over(c);
+        let mut c = self.reports.over(self.timing.over(c));
         if let Some(send) = self.send {
             (c.send_readings, c.send_estimates) = (send.sent().readings, send.sent().estimates);
         }
-        c.confidence = self.reports.confidence.map_or(c.confidence, ConfidenceSent::from);
         c.shorted_below_ohm = self.shorted_below_ohm.unwrap_or(c.shorted_below_ohm);
         c.open_above_ohm = self.open_above_ohm.unwrap_or(c.open_above_ohm);
         c.contact_threshold = self.contact_threshold.unwrap_or(c.contact_threshold);
         c.load_threshold = self.load_threshold.unwrap_or(c.load_threshold);
         c.slip_mm_per_s = self.slip_mm_per_s.unwrap_or(c.slip_mm_per_s);
-        c.filter_time_constant_us =
-            self.reports.filter.filter_ms.unwrap_or(c.filter_time_constant_us);
-        c.filter_lead_us = self.reports.filter.lead_ms.unwrap_or(c.filter_lead_us);
-        c.track = self.reports.track.unwrap_or(c.track);
-        c.report_every = self.reports.report_every.unwrap_or(c.report_every);
         c
     }
 }
