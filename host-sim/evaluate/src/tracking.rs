@@ -255,6 +255,24 @@ mod tests {
     }
 
     #[test]
+    fn a_tracker_of_forces_or_of_two_axes_is_refused() {
+        let press = World::press();
+        assert!(check(&press).is_ok());
+        let outputs = |quantity, axes: &[Axis]| {
+            let outputs = ElectrodeOutputs { quantity, axes: axes.to_vec() };
+            check(&World { outputs: Outputs::Electrodes(outputs), ..press.clone() })
+        };
+        assert!(outputs(Quantity::Deformation, &[Axis::Z]).is_ok());
+        for refused in [
+            outputs(Quantity::Force, &[Axis::X, Axis::Y, Axis::Z]),
+            outputs(Quantity::Deformation, &[Axis::X, Axis::Z]),
+        ] {
+            let message = refused.unwrap_err().to_string();
+            assert!(message.contains("deformations along z"), "{message}");
+        }
+    }
+
+    #[test]
     fn a_reading_that_is_filled_says_nothing_of_a_contact() {
         let (scene, blob) = trained();
         let (path, synthesis) = (scene.world.path.unwrap(), Synthesis::new(&scene.world));
@@ -299,8 +317,7 @@ mod tests {
 
     #[test]
     fn a_tracker_needs_a_single_contact_and_deformations() {
-        for (name, words) in
-            [("paper", "follows one contact"), ("contact", "outputs that are deformations")]
+        for (name, words) in [("paper", "follows one contact"), ("contact", "deformations along z")]
         {
             let mut scene = Experiment::load(name).unwrap();
             (scene.frames, scene.training.refine, scene.training.track) = (500, false, true);
