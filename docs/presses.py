@@ -11,6 +11,8 @@ import sys
 import tempfile
 from pathlib import Path
 
+if len(sys.argv) not in (4, 5):
+    sys.exit(__doc__)
 presses_file, port, log_file, shape = (*sys.argv[1:], "8x18")[:4]
 rows, columns = map(int, shape.split("x"))
 readings = [f"r{row}c{column}_ohm" for row in range(1, rows + 1) for column in range(1, columns + 1)]

@@ -466,8 +466,11 @@ fn layouts_are_compared_and_the_best_decoder_is_chosen() {
         assert!(table.lines().any(|line| line.contains(name) && line.contains(&rmse)), "{rmse}");
     }
     folder.write("drifts.toml", scene.replace("[noise]", "[drift]\ngain = 0.02\n\n[noise]"));
-    let said = folder.succeed(&["compare", "scene.toml", "drifts.toml", "--limit-only"]);
-    assert!(said.contains("1 point with no limit: "), "{said}");
+    let limits = folder.run(&["compare", "scene.toml", "drifts.toml", "--limit-only"]);
+    let said = String::from_utf8(limits.stdout).unwrap();
+    assert!(limits.status.success() && said.contains("1 point with no limit: "), "{said}");
+    let stages = String::from_utf8(limits.stderr).unwrap();
+    assert!(stages.contains("measure …\n") && !stages.contains("train"), "{stages}");
     let limit = folder.json(&["compare", "lists.toml", "--limit-only"]);
     assert_eq!(limit["objectives"][0], "limit_dz_mm");
     assert!(folder.fail(&["compare", "scene.toml", "scene.toml"], 2).contains("twice"));

@@ -32,7 +32,7 @@ impl Definition {
                 "× limit",
                 "",
                 Some(2),
-                "RMSE/least possible RMSE",
+                "RMSE/least possible RMSE, both on the frames of the limit",
                 |it| it.ratio_to_limit,
             )
         },

@@ -66,9 +66,14 @@ pub fn run(
         worked.failed.extend(of_failed(plan, &points[index], record));
         Ok(())
     };
-    progress.stage("train and measure", left.iter().map(Vec::len).sum());
+    progress.stage(stage(plan), left.iter().map(Vec::len).sum());
     each(plan, points, &left, &keep)?;
     Ok(worked)
+}
+
+/// What is done with each point, for people.
+const fn stage(plan: &Plan) -> &'static str {
+    if plan.train { "train and measure" } else { "measure" }
 }
 
 /// Computes all points, and returns their records in their order.
@@ -94,7 +99,7 @@ pub fn until(
     progress: &dyn Progress,
 ) -> Result<Vec<Option<Record>>> {
     let records = Mutex::new(vec![None; points.len()]);
-    progress.stage("train and measure", points.len());
+    progress.stage(stage(plan), points.len());
     let keep = |index: usize, record: &Record| {
         accept(index, record)?;
         progress.step();

@@ -104,7 +104,8 @@ int main(int count, char **arguments)
         puts("");
     }
     if (found < 0) {
-        fprintf(stderr, "line %lu: not %u numbers with commas between them\n", number, TAXEL_MODEL_READINGS);
+        fprintf(stderr, "line %lu: not %u numbers with commas between them: give the readings that taxel_model.h lists\n",
+                number, TAXEL_MODEL_READINGS);
         return 2;
     }
     return 0;
