@@ -370,6 +370,13 @@ pub mod serial_port {
         assert_eq!(text.lines().count(), 11);
         assert!(text.starts_with("r1e1_dx_mm,r1e1_dy_mm,r1e1_dz_mm,"), "{text}");
 
+        // The device's own limits of readings hold: by these, none is sound.
+        let limits = |ohm| folder.succeed(&["link", &port, "configure", "--open-above-ohm", ohm]);
+        limits("6");
+        let record = ["link", &port, "record", new_file, "-n", "2", "-o", "none.csv"];
+        assert!(folder.fail(&record, 1).contains("sent no estimate"));
+        limits("1000");
+
         // Without a model, readings are recorded, which can be trained on. Here they are ideal, five in
         // turn.
         folder.succeed(&["link", &port, "record", "-n", "6", "-o", "readings.csv"]);
