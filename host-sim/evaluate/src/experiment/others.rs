@@ -2,9 +2,9 @@
 
 use serde::Deserialize;
 use taxel_data::{BadValue, require};
-use taxel_simulate::World;
 use taxel_simulate::motion::{Dent, Kind};
 use taxel_simulate::profile::Profile;
+use taxel_simulate::{World, rubber};
 
 /// Contact that a model was not trained on.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
@@ -67,9 +67,10 @@ pub(super) fn derived(world: &World) -> Vec<OtherContact> {
 }
 
 impl OtherContact {
-    /// World of these contacts, still ones, instead of those of `world`.
+    /// World of these contacts, still ones under elastic rubber, instead of those of `world`.
     fn world(&self, world: &World) -> World {
-        World { motion: self.deformation.clone(), path: None, ..world.clone() }
+        let (motion, rubber) = (self.deformation.clone(), rubber::Kind::default());
+        World { motion, rubber, path: None, ..world.clone() }
     }
 }
 

@@ -114,6 +114,12 @@ fn scenes_without_a_contact_have_no_others() {
     // Two contacts have no one centre.
     assert!(contact.others.iter().all(|other| other.name != "two contacts"));
     assert_eq!(contact.others.len(), 7);
+    // Other contacts are still, so that rubber that creeps does not matter for them.
+    let moving = Experiment::text("moving").unwrap();
+    let creeping = "[rubber]\nkind = \"standard_linear_solid\"\ninstant_share = 0.8\ntime_constant_ms = 100.0\n";
+    let others = [String::new(), creeping.into()]
+        .map(|rubber| Experiment::parse("s", &format!("{moving}\n{rubber}")).unwrap().others.len());
+    assert_eq!(others, [8, 8]);
 }
 
 #[test]
