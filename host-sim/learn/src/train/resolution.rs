@@ -28,6 +28,10 @@ pub fn check(dataset: &Dataset) -> Result<()> {
         let rounding = rounding(table);
         let columns = table.names.iter().zip(table.ranges()).zip(rounding);
         for ((name, range), rounding) in columns {
+            if range[0] > range[1] {
+                let message = format!("column {} has no value: leave it out", quoted(name));
+                return Err(Error::unfit(message));
+            }
             if let Some(why) = refused(range, rounding, role) {
                 return Err(column(name, range, &why));
             }
@@ -159,6 +163,8 @@ mod tests {
 
     #[test]
     fn what_f32_would_lose_is_refused_by_name_with_the_fix() {
+        let empty = checked([f64::NAN; 2], 1.0).unwrap_err();
+        assert!(empty.contains("\"ch1\" has no value: leave it out"), "{empty}");
         for (range, scale, words) in [
             ([1e8, 1e8 + 1.0], 1.0, ["ch1", "8.0 apart", "subtract 100000000"]),
             ([1e6, 1e6 + 1.0], 1.0, ["ch1", "0.0625 apart", "subtract 1000000"]),
