@@ -35,7 +35,7 @@ const FORM: [[f64; 2]; 3] = [[0.25, 0.6], [0.2, 0.6], [0.2, 0.9]];
 /// Checks that contacts of this world can be tracked.
 ///
 /// # Errors
-/// [`Error`](crate::Error) for a motion without a single contact, and outputs that are not the deformation along z or along
+/// [`Error`] for a motion without a single contact, and outputs that are not the deformation along z or along
 /// x, y and z of each electrode.
 pub fn check(world: &World) -> Result<()> {
     if world.motion.as_press().is_none() {

@@ -75,7 +75,8 @@ impl Settings {
     pub fn mean_after(&self, mean: &Vector, dt_s: f32) -> Vector {
         let mut later = *mean;
         for (axis, [rate, _, centre]) in self.smooth.into_iter().enumerate() {
-            move_on(&mut later, axis, centre, transition(rate, dt_s));
+            let now = [mean[axis], mean[LATENTS + axis]];
+            [later[axis], later[LATENTS + axis]] = moved(now, centre, transition(rate, dt_s));
         }
         later
     }
@@ -91,7 +92,7 @@ impl Settings {
         for (axis, [rate, _, centre]) in self.smooth.into_iter().enumerate() {
             let (value, speed) = (axis, LATENTS + axis);
             let transition = transition(rate, dt_s);
-            move_on(mean, axis, centre, transition);
+            [mean[value], mean[speed]] = moved([mean[value], mean[speed]], centre, transition);
             let [[a, b], [c, d]] = transition;
             let (values, speeds) = (root[value], root[speed]);
             root[value] = core::array::from_fn(|at| a * values[at] + b * speeds[at]);
@@ -152,11 +153,10 @@ impl Settings {
     }
 }
 
-/// Lets value and rate of an axis become what a transition makes of them, about the `centre`.
-fn move_on(mean: &mut Vector, axis: usize, centre: f32, [[a, b], [c, d]]: [[f32; 2]; 2]) {
-    let (value, speed) = (mean[axis] - centre, mean[LATENTS + axis]);
-    mean[axis] = centre + a * value + b * speed;
-    mean[LATENTS + axis] = c * value + d * speed;
+/// What a transition makes of a value and its rate, about the `centre`.
+fn moved([value, rate]: [f32; 2], centre: f32, [[a, b], [c, d]]: [[f32; 2]; 2]) -> [f32; 2] {
+    let value = value - centre;
+    [centre + a * value + b * rate, c * value + d * rate]
 }
 
 /// What value and rate become of both after a time.
