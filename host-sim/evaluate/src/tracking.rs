@@ -38,9 +38,16 @@ const FORM: [[f64; 2]; 3] = [[0.25, 0.6], [0.2, 0.6], [0.2, 0.9]];
 /// [`Error`] for a motion without a single contact, and outputs that are not the deformation along z or along
 /// x, y and z of each electrode.
 pub fn check(world: &World) -> Result<()> {
-    if world.motion.as_press().is_none() {
-        return Err(refused(NO_CONTACT));
-    }
+    tracked_press(world).map(|_| ())
+}
+
+/// The contact of this world, if it can be tracked.
+fn tracked_press(world: &World) -> Result<Dent> {
+    let press = world.motion.as_press().ok_or_else(|| {
+        refused(
+            "a tracker follows one contact, and this scene's deformation has none: leave track out",
+        )
+    })?;
     let is_tracked = match &world.outputs {
         Outputs::Electrodes(ElectrodeOutputs { quantity, axes }) => {
             *quantity == Quantity::Deformation && (axes.as_slice() == [Axis::Z] || axes.len() == 3)
@@ -55,11 +62,8 @@ pub fn check(world: &World) -> Result<()> {
     if world.sensor.electrodes_per_row_wire > MOST_ELECTRODES {
         return Err(refused(format!("a tracker has at most {MOST_ELECTRODES} electrodes a row")));
     }
-    Ok(())
+    Ok(press)
 }
-
-const NO_CONTACT: &str =
-    "a tracker follows one contact, and this scene's deformation has none: leave track out";
 
 fn refused(rule: impl Into<String>) -> Error {
     BadValue::new("training.track", true, rule).into()
@@ -70,7 +74,7 @@ fn refused(rule: impl Into<String>) -> Error {
 /// # Errors
 /// As those of [`check`].
 pub fn add(blob: &ModelBlob, world: &World) -> Result<ModelBlob> {
-    check(world)?;
+    let press = tracked_press(world)?;
     let sensor = &world.sensor;
     let sizes = Sizes {
         rows: world.read_rows.len(),
@@ -78,7 +82,7 @@ pub fn add(blob: &ModelBlob, world: &World) -> Result<ModelBlob> {
         columns: sensor.column_wires,
         span: span(sensor),
     };
-    let block = block(world, sizes)?;
+    let block = block(world, &press, sizes);
     let tracker = Tracker::new(sizes, &block)
         .map_err(|cause| refused(format!("the scene gives no tracker: {cause}")))?;
     Ok(blob.with_tracker(tracker)?)
@@ -92,10 +96,9 @@ fn span(sensor: &Sensor) -> usize {
 }
 
 /// The tracker's floats.
-fn block(world: &World, sizes: Sizes) -> Result<Vec<f32>> {
+fn block(world: &World, press: &Dent, sizes: Sizes) -> Vec<f32> {
     let sensor = &world.sensor;
-    let press = world.motion.as_press().ok_or_else(|| refused(NO_CONTACT))?;
-    let settings = settings(world, &press);
+    let settings = settings(world, press);
     let deformations = deformations(press.dent_depth_mm[1], press.shear_ratio[1]);
     let shares = Shares::new(&deformations);
     let (mut rest_ohm, mut places, mut terms) = (vec![], vec![], vec![]);
@@ -125,7 +128,7 @@ fn block(world: &World, sizes: Sizes) -> Result<Vec<f32>> {
     }
     let block = [settings.floats().to_vec(), rest_ohm, places, terms].concat();
     debug_assert_eq!(block.len(), sizes.block_floats());
-    Ok(block)
+    block
 }
 
 /// Conductance times g of an electrode at `at` that moved, to the electrodes of a column.

@@ -205,13 +205,10 @@ fn open(
         None => false,
     };
     let decodes = identity.model.is_some() && !is_other;
-    let own = device.resume()?;
-    let usual = Configuration::DEFAULT.frame_period_us;
-    let own_period = if own.frame_period_us == 0 { usual } else { own.frame_period_us };
+    let own = device.resume_to_scan()?;
     let configuration = Configuration {
-        frame_period_us: line.period_us.unwrap_or(own_period),
+        frame_period_us: line.period_us.unwrap_or(own.frame_period_us),
         confidence: ConfidenceSent::Deviations,
-        report_every: 1,
         ..own
     };
     let sent = Sent { readings: true, estimates: decodes };

@@ -49,7 +49,9 @@ fn main() -> ! {
     for (reading, bytes) in readings_ohm.iter_mut().zip(frame.bytes().as_chunks().0) {
         *reading = f32::from_le_bytes(*bytes);
     }
-    convert_sums();
+    if (shape.rows, shape.inputs) == (ROWS, COLUMNS) {
+        convert_sums();
+    }
     let mut status = [RowStatus::MissingReading; MOST_ROWS];
     let mut estimate = Estimate { outputs, status: unwrap!(status.get_mut(..shape.rows)) };
     let state = unwrap!(cortex_m::singleton!(: State = State::new()));
@@ -104,16 +106,20 @@ fn report(estimate: &Estimate<'_>) {
     assert!(queued > 4 * estimate.outputs.len(), "the report is too short");
 }
 
+/// Wires of the board's image.
+const ROWS: usize = 8;
+const COLUMNS: usize = 18;
+
 /// Sums of samples as of the paper's sensor at rest.
 struct Sums;
 
-impl Sequencer<18> for Sums {
+impl Sequencer<COLUMNS> for Sums {
     const FULL_SCALE_COUNTS: u16 = 4095;
     const MOST_SAMPLES: u16 = 16;
 
     fn start(&mut self, _: &[Option<RowWire>], _: u32, _: u16) {}
 
-    fn poll(&mut self, sums: &mut [[u32; 18]]) -> Option<Result<(), SequencerFault>> {
+    fn poll(&mut self, sums: &mut [[u32; COLUMNS]]) -> Option<Result<(), SequencerFault>> {
         let (idle, rows) = sums.split_first_mut()?;
         idle.fill(12 * 250);
         rows.as_flattened_mut().fill(12 * 2000);
@@ -129,14 +135,16 @@ impl Sequencer<18> for Sums {
 
 /// Turns the sums of a scan of 8 × 18 wires into Ω.
 fn convert_sums() {
-    let sums = unwrap!(cortex_m::singleton!(: [[u32; 18]; 9] = [[0; 18]; 9]));
-    let mut scanner = PassScanner::<_, 8, 9, 18>::new(Sums, ZeroPotential::TYPICAL, sums);
+    let sums =
+        unwrap!(cortex_m::singleton!(: [[u32; COLUMNS]; ROWS + 1] = [[0; COLUMNS]; ROWS + 1]));
+    let mut scanner =
+        PassScanner::<_, ROWS, { ROWS + 1 }, COLUMNS>::new(Sums, ZeroPotential::TYPICAL, sums);
     let Scanning::Runs(scanner) = scanner.scanning() else { return };
-    let rows = [0, 1, 2, 3, 4, 5, 6, 7].map(RowWire);
-    let wires = Selection { rows: &rows, columns: ColumnWires::first(18) };
+    let rows: [RowWire; ROWS] = core::array::from_fn(RowWire);
+    let wires = Selection { rows: &rows, columns: ColumnWires::first(COLUMNS) };
     scanner.start(ScanSettings { settling_us: 1, oversampling: 12 }, wires);
     scanner.poll();
-    let mut frame = [0.0; 144];
+    let mut frame = [0.0; ROWS * COLUMNS];
     region("readings", || {
         black_box(&mut *scanner).take(black_box(&mut frame));
     });

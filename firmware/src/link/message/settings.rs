@@ -48,8 +48,8 @@ pub struct Configuration {
     pub report_every: u16,
     /// Whether a model with a tracker ([`taxel_core::track`]) follows the contact; frames that it explains are not filtered.
     pub track: bool,
-    /// Load at which its [event](taxel_core::events) begins, in the model's unit: of the force, or else of the largest output.
-    /// With 0, none begins.
+    /// Load at which its [event](taxel_core::events) begins, in the model's unit: of the force, of a tracked contact's depth, or
+    /// else of the largest output. With 0, none begins.
     pub load_threshold: f32,
     /// Speed in mm/s of a tracked contact's place at which a slip begins; with 0, none begins.
     pub slip_mm_per_s: f32,

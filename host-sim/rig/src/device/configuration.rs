@@ -23,6 +23,17 @@ impl Device {
         self.ask_for_configuration(&Request::Resume)
     }
 
+    /// Makes the configuration active that the device keeps. Returns what a host sets on top of it to scan: every scan is
+    /// reported, at the default period if the device keeps none.
+    pub fn resume_to_scan(&mut self) -> Result<Configuration> {
+        let own = self.resume()?;
+        let frame_period_us = match own.frame_period_us {
+            0 => Configuration::DEFAULT.frame_period_us,
+            kept => kept,
+        };
+        Ok(Configuration { frame_period_us, report_every: 1, ..own })
+    }
+
     fn ask_for_configuration(&mut self, request: &Request<'_>) -> Result<Configuration> {
         self.ask_plainly(request, |report| match report {
             Report::Configuration(configuration) => Some(*configuration),

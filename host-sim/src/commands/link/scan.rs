@@ -80,14 +80,9 @@ impl ReportArguments {
 }
 
 impl ScanArguments {
-    /// The configuration that the device keeps, with the times that are given. Every scan is reported, at the default period
-    /// if the device keeps none.
+    /// The configuration that the device keeps, with the times that are given.
     pub fn configuration(&self, device: &mut Device) -> taxel_rig::Result<Configuration> {
-        let mut own = Configuration { report_every: 1, ..device.resume()? };
-        if own.frame_period_us == 0 {
-            own.frame_period_us = Configuration::DEFAULT.frame_period_us;
-        }
-        Ok(self.timing.over(own))
+        Ok(self.timing.over(device.resume_to_scan()?))
     }
 }
 
