@@ -138,8 +138,8 @@ pub struct Scale<const COLS: usize> {
 }
 
 impl<const ROWS: usize, const COLS: usize> ZeroPotential<ROWS, COLS> {
-    /// Typical constants: 0.2 V and 560 Ω (3.6 mA a column, 65 mA a row, readings from 36 Ω), and a switch of 0.26
-    /// Ω. At 5.5 mA an MCP6024 at 3.3 V is sure to reach 3.1 V.
+    /// Typical constants: 0.2 V and 560 Ω (3.6 mA a column, 65 mA a row, readings from 39 Ω, or 36 Ω where 18 columns load the
+    /// row), and a switch of 0.26 Ω. At 5.5 mA an MCP6024 at 3.3 V is sure to reach 3.1 V.
     pub const TYPICAL: Self = Self {
         sensor_rows: ROWS as u16,
         saturated_v: 3.1,

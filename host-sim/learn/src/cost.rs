@@ -1,7 +1,8 @@
 //! What decoding costs on a Cortex-M4F, predicted from a model's [`Design`]: instructions, cycles, flash and RAM.
 //!
-//! Instructions are a linear formula of a model's sizes, with five constants for each number format. `cargo xtask cycles`
-//! counts models in QEMU, and fails if a prediction is off by more than a tenth. `docs/cycles.md` says more.
+//! Instructions are a linear formula of a model's sizes, with five constants for each number format, and more for inputs that
+//! do not fit registers. `cargo xtask cycles` counts models in QEMU, and fails if a prediction is off by more than a tenth.
+//! `docs/cycles.md` says more.
 
 mod design;
 mod memory;

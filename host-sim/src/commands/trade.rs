@@ -65,7 +65,7 @@ pub struct Arguments {
     /// accurate point within all bounds is chosen (the cheapest of those whose errors do not differ significantly).
     #[arg(long, value_name = "CYCLES")]
     max_cycles: Option<u64>,
-    /// Choose among points whose blob has at most so many bytes [default, with another bound: 131072, the size of a slot].
+    /// Choose among points whose blob has at most so many bytes; the front has no others [default: 131072, the size of a slot].
     #[arg(long, value_name = "BYTES")]
     max_flash: Option<usize>,
     /// Choose among points that scan and decode at least so many frames a second.
