@@ -217,7 +217,6 @@ mod tests {
     use crate::evaluate::moving_contacts::MovingContacts;
     use crate::experiment::Experiment;
     use crate::moving::Moving;
-    use crate::touches::Touches;
 
     /// A model of the scene `moving` with a tracker, in the time that a test has.
     fn trained() -> (Experiment, ModelBlob) {
@@ -241,20 +240,11 @@ mod tests {
         let (mut scene, blob) = trained();
         let [_, filtered, tracked] = errors(&scene, &blob);
         assert!(tracked < 0.66 * filtered && tracked < 0.018, "{tracked} {filtered}");
-        // Scans that take four times as long leave less to a decoder that knows all of the scene.
-        let path = scene.world.path.unwrap();
-        let touches = Touches::new(&scene, Synthesis::new(&scene.world), (path, 1), "dz_mm");
-        let z = &touches.limit(Some(1.0), Some(6)).unwrap().limits()[0];
-        assert!(z.limit + 2.0 * z.limit_standard_error < tracked, "{tracked} {z:?}");
-        // Contacts of other forms, which neither has met.
-        for other in ["punch", "ellipse", "tail"] {
-            let of_name = scene.others.iter().find(|it| it.name.contains(other));
-            let deformation = of_name.unwrap_or_else(|| panic!("{other}")).deformation.clone();
-            let own = std::mem::replace(&mut scene.world.motion, deformation);
-            let [_, filtered, tracked] = errors(&scene, &blob);
-            assert!(tracked < filtered, "{other}: {tracked} {filtered}");
-            scene.world.motion = own;
-        }
+        // A contact of another form, which neither has met; the example `tracking` has all forms, and the limit.
+        let punch = scene.others.iter().find(|it| it.name.contains("punch")).unwrap();
+        scene.world.motion = punch.deformation.clone();
+        let [_, filtered, tracked] = errors(&scene, &blob);
+        assert!(tracked < filtered, "{tracked} {filtered}");
     }
 
     #[test]

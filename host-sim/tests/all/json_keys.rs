@@ -41,7 +41,7 @@ const COMMANDS: [&str; 99] = [
     "decode l.bin log.csv --keep time_s --filter-ms 40 --lead-ms 5 -o l.csv",
     "run contact.toml -o places",
     "run drifts.toml --relative-inputs -o drifts",
-    "run moving.toml -o moves",
+    "run short.toml -o moves",
     "synth moving.toml -n 40 --frame-rate 200 --scan-ms 2 -o moves.csv",
     "synth drifts.toml -n 20 --scale 1.5 --seed 3 -o scaled.csv",
     "limit spans.toml --noise 0.01,0.03 -n 4 -o spans",
@@ -216,7 +216,9 @@ fn prepared() -> Folder {
             .replace("[training]", "[training]\nrefine = false")
     };
     folder.write("contact.toml", few(include_str!("../../../scenes/contact.toml")));
-    folder.write("moving.toml", few(include_str!("../../../scenes/moving.toml")));
+    let moving = few(include_str!("../../../scenes/moving.toml"));
+    folder.write("short.toml", moving.replace("duration_s = 0.6", "duration_s = 0.1"));
+    folder.write("moving.toml", moving);
     let level = "kind = \"relative\"\nlevel = 0.005";
     let drifts = "kind = \"absolute\"\nlevel_ohm = 0.4\ncorrelated_level_ohm = 0.3\ntime_constant_ms = 20.0\n\n[drift]\ngain = 0.03";
     folder.write(

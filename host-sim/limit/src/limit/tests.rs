@@ -62,7 +62,7 @@ fn low_noise_comes_to_the_cramer_rao_bound() {
         // A frame a lane: at least a radius from the edges. Differences of each latent stand in lanes of their own.
         let mut random = Random::new(7, Stream::Test, Purpose::Contact, 0, 0);
         let mut ratios = [0.0; 3];
-        for _ in 0..100 {
+        for _ in 0..50 {
             let near_the_middle = |i: usize| if i < 2 { 0.5 } else { 1.0 };
             let truth: Vec<f64> = (0..n).map(|i| near_the_middle(i) * random.normal()).collect();
             let mut latents: Vec<Lanes> = truth.iter().map(|x| [*x; LANES]).collect();
@@ -88,7 +88,7 @@ fn low_noise_comes_to_the_cramer_rao_bound() {
             assert!(posterior.effective.iter().all(|size| *size >= 100.0), "{posterior:?}");
             let bounded = posterior.variance.iter().zip(&variances);
             for (ratio, (variance, bound)) in ratios.iter_mut().zip(bounded) {
-                *ratio += variance / bound / 100.0;
+                *ratio += variance / bound / 50.0;
             }
         }
         for (output, ratio) in ratios.iter().enumerate() {
