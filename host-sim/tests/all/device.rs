@@ -496,6 +496,30 @@ pub mod serial_port {
     }
 
     #[test]
+    fn an_open_reading_is_an_empty_field() {
+        let folder = Folder::new("open");
+        let model = model(3);
+        let mut frames = super::frames();
+        frames[0][5][7] = f32::INFINITY;
+        let (port, near) = port_with(&model, frames);
+        drop(near);
+        for command in ["record", "baseline"] {
+            let found = folder.json(&["link", &port, command, "-n", "5", "-o", "log.csv"]);
+            assert_eq!(found["values_missing"], 1, "{found}");
+            let text = folder.read("log.csv");
+            let fields = text.lines().skip(1).flat_map(|line| line.split(','));
+            assert_eq!(fields.clone().filter(|field| field.is_empty()).count(), 1, "{text}");
+            assert!(
+                fields
+                    .filter(|field| !field.is_empty())
+                    .all(|it| it.parse::<f64>().unwrap().is_finite())
+            );
+        }
+        folder.write("model.bin", model.bytes());
+        folder.succeed(&["decode", "model.bin", "log.csv", "-o", "estimate.csv"]);
+    }
+
+    #[test]
     fn a_sensor_that_says_nothing_is_no_recording() {
         let folder = Folder::new("silent");
         let model = model(3);

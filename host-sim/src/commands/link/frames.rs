@@ -60,11 +60,19 @@ pub fn hear_scans(
     Ok(scans)
 }
 
-/// Number of missing values; if all are missing, that is a failure.
-pub fn missing<'v>(values: impl Iterator<Item = &'v f64> + Clone, wanted: Wanted) -> Result<usize> {
-    let missing = values.clone().filter(|value| value.is_nan()).count();
-    if missing < values.count() {
-        return Ok(missing);
+/// A value as text files hold it: a reading that is open, which is infinite, is missing.
+pub fn in_text(value: f64) -> f64 {
+    if value.is_finite() { value } else { f64::NAN }
+}
+
+/// Number of values that are missing or open; if all are missing, that is a failure.
+pub fn missing<'v>(
+    mut values: impl Iterator<Item = &'v f64> + Clone,
+    wanted: Wanted,
+) -> Result<usize> {
+    let empty = values.clone().filter(|value| !value.is_finite()).count();
+    if values.any(|value| !value.is_nan()) {
+        return Ok(empty);
     }
     let what = if wanted.sent().estimates { "estimate" } else { "reading" };
     Err(Error::failed(format!(

@@ -21,7 +21,7 @@ use super::super::health::note_faults;
 use super::super::recordings::is_recording;
 use super::super::scene_argument::ModelArgument;
 use super::super::{Common, arguments, print};
-use super::frames::{hear_scans, missing, values};
+use super::frames::{hear_scans, in_text, missing, values};
 use super::scan::{
     Confidence, ReportArguments, ScanArguments, Wanted, check_length, configure, patience,
     patience_for_next, reading_names,
@@ -106,7 +106,7 @@ impl RecordArguments {
         let mut first_us = None;
         let lines = starts_us.into_iter().zip(lines).map(|(start_us, line)| {
             let since_us = start_us - *first_us.get_or_insert(start_us);
-            time.map(|_| since_us as f64 / 1e6).into_iter().chain(line)
+            time.map(|_| since_us as f64 / 1e6).into_iter().chain(line.into_iter().map(in_text))
         });
         let header = time.into_iter().chain(names.iter().map(String::as_str));
         Ok(csv_file::write(&self.to.output, header, lines)?)
@@ -270,7 +270,7 @@ pub fn baseline(
     check_length(0, readings.len(), names.len())?;
     let values_missing = missing(readings.iter(), Wanted::Readings)?;
     device.keep(Setting::Baseline)?;
-    let lines = std::iter::once(readings.iter().copied());
+    let lines = std::iter::once(readings.iter().copied().map(in_text));
     csv_file::write(&action.to.output, names.iter().map(String::as_str), lines)?;
     let saved = Saved {
         frames: frames.into(),
