@@ -1,8 +1,9 @@
 """Measures how often each warning is given: python3 docs/false_alarms.py (numpy, and `taxel` on the path)
 
 Sound logs are of two sensors: a mat that `taxel synth` simulates, and a velostat mat with physics of its own, without creep
-and with creep that ends within seconds. Faulty logs are the same kinds with one fault each. It prints a line for each
-warning: how many sound logs it is given for, and how many faulty ones, with Wilson intervals of 95 %.
+and with creep that ends within seconds. Faulty logs are the same kinds with a fault each, or with two that different warnings
+tell. It prints a line for each warning: how many sound logs it is given for, and how many faulty ones, with Wilson intervals
+of 95 %.
 
 python3 docs/false_alarms.py 10 takes ten logs of each kind instead of 20.
 """
