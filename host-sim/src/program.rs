@@ -24,7 +24,7 @@ use crate::commands::{
 /// Files are written whole or not at all: after an error or an interruption, old files are unchanged and no new ones
 /// are left. `-o -` writes to stdout; results then go to stderr. Links are followed, and read-only files are refused.
 #[derive(Parser)]
-#[command(version)]
+#[command(name = "taxel", version)]
 struct Cli {
     #[command(subcommand)]
     command: Option<Command>,

@@ -124,12 +124,6 @@ impl Line {
                 return Err(PyValueError::new_err(message));
             }
         };
-        let usual = Configuration::DEFAULT;
-        let configuration = Configuration {
-            frame_period_us: period_us.unwrap_or(usual.frame_period_us),
-            confidence: if confidence { ConfidenceSent::Deviations } else { usual.confidence },
-            ..usual
-        };
         let open = move |stop: &Arc<AtomicBool>| -> Result<(Box<dyn Source>, _), Error> {
             let wire = serial::open(&port, baud)?;
             if let Some(is_marked) = other {
@@ -143,6 +137,12 @@ impl Line {
             }
             let mut device = Device::new(wire)?;
             device.stop = Some(Arc::clone(stop));
+            let own = device.resume_to_scan()?;
+            let configuration = Configuration {
+                frame_period_us: period_us.unwrap_or(own.frame_period_us),
+                confidence: if confidence { ConfidenceSent::Deviations } else { own.confidence },
+                ..own
+            };
             let (scans, found) = DeviceScans::new(device, configuration, sent)?;
             Ok((Box::new(scans), identity(found)))
         };

@@ -146,20 +146,16 @@ impl Device {
     /// Times of a frame whose decoding has this `cost`.
     pub fn times(&self, scan_ms: Option<f64>, cost: &Cost) -> Times {
         let decode_ms = cost.cycles as f64 / (self.clock_mhz * 1000.0);
-        let scanned_ms = scan_ms.unwrap_or(0.0);
-        let [sums_ms, readings_ms] = match self.readout {
-            Readout::OnChip if scan_ms.is_some() => {
-                [ONCHIP_SUMS_US, ONCHIP_READINGS_US].map(|us| f64::from(us) / 1000.0)
-            }
-            // They are part of the scan, or unknown.
-            _ => [0.0; 2],
-        };
-        let work_ms = readings_ms + decode_ms;
-        let (period_ms, frame_ms) = match self.readout {
-            Readout::Spi => (scanned_ms + work_ms, scanned_ms + work_ms),
+        let (period_ms, frame_ms) = match (self.readout, scan_ms) {
+            // Decoding alone is known.
+            (_, None) => (decode_ms, decode_ms),
+            (Readout::Spi, Some(scan_ms)) => (scan_ms + decode_ms, scan_ms + decode_ms),
             // Sums wait until the frame before is decoded.
-            Readout::OnChip => {
-                let period_ms = scanned_ms.max(work_ms) + sums_ms;
+            (Readout::OnChip, Some(scan_ms)) => {
+                let [sums_ms, readings_ms] =
+                    [ONCHIP_SUMS_US, ONCHIP_READINGS_US].map(|us| f64::from(us) / 1000.0);
+                let work_ms = readings_ms + decode_ms;
+                let period_ms = scan_ms.max(work_ms) + sums_ms;
                 (period_ms, period_ms + work_ms)
             }
         };
@@ -200,8 +196,10 @@ mod tests {
         assert!((times.period_ms() - 0.421).abs() < 1e-12);
         assert!((times.frame_ms - (0.421 + 0.36)).abs() < 1e-12);
         let slower = Device { clock_mhz: 90.0, ..board };
-        assert_eq!(slower.times(None, &cost).frame_ms, 0.4);
-        assert_eq!(slower.times(None, &cost).frames_per_s, 2500.0);
+        for device in [slower, Device { readout: Readout::OnChip, ..slower }] {
+            let times = device.times(None, &cost);
+            assert_eq!((times.frame_ms, times.frames_per_s), (0.4, 2500.0));
+        }
     }
 
     #[test]
