@@ -1,6 +1,8 @@
 // The last ten seconds of numbers, drawn by uPlot.
 
 const WINDOW_S = 10;
+/** Longest time in s without frames that a line bridges, unless frames are further apart. */
+const GAP_S = 0.5;
 
 /** Numbers of the last ten seconds: `rows[0]` holds times in s, the others a series each. */
 class Trace {
@@ -12,6 +14,8 @@ class Trace {
     if (time === last) return;
     // The source went back, or far ahead: what came before is of another time.
     if (time < last || time > last + WINDOW_S) this.rows.forEach((row) => { row.length = 0; });
+    const apart = last - times.at(-2);
+    if (time > last + Math.max(GAP_S, 4 * apart)) this.rows.forEach((row, index) => row.push(index ? null : last + apart));
     [time, ...values].forEach((value, index) => this.rows[index].push(value ?? null));
     // Frames of a slowed recording lie close together.
     while (times[0] < time - WINDOW_S || times.length > 2000) this.rows.forEach((row) => row.shift());
