@@ -26,7 +26,7 @@ pub struct ConfigureArguments {
     /// Relative change against the baseline that counts as contact.
     #[arg(long, value_name = "SHARE")]
     contact_threshold: Option<f32>,
-    /// Load of an event, in the unit of the force, or else of the largest output; 0 is off.
+    /// Load of an event: of the force, a tracked contact's depth, or else the largest output; 0 is off.
     #[arg(long, value_name = "LOAD")]
     load_threshold: Option<f32>,
     /// Speed over the sensor from which a tracked contact slips; 0 is off.
