@@ -82,8 +82,9 @@ pub struct TrainingOptions {
     /// but one missing reading costs only its row.
     #[arg(long, action = ArgAction::Set, num_args = 0, default_missing_value = "true")]
     pub each_row: Option<bool>,
-    /// Number of features that all readings are projected to, at most the number of outputs and of products of two or
-    /// three outputs [default: the number of readings of a row; none for outputs that belong to no row].
+    /// Number of features that all readings are projected to: fewer than the readings, and at most the number of outputs
+    /// and of products of two or three outputs [default: the number of readings of a row, at most 18; 18 for outputs that
+    /// belong to no row, or none of few readings].
     #[arg(long, value_name = "F")]
     pub features: Option<usize>,
     /// Kind of features: `plain` uses readings as they are; `normalised` separates the shape of a touch from its
