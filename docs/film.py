@@ -71,4 +71,6 @@ def main(rest_path, log_path, estimate_path, picture_path):
         file.write("\n".join(parts) + "\n</svg>\n")
 
 
+if len(sys.argv) != 5:
+    sys.exit(__doc__)
 main(*sys.argv[1:])

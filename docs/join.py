@@ -11,6 +11,8 @@ import pandas as pd
 
 TIME, TRUTH, STEP_S = "time_s", "force_n", 0.01
 
+if len(sys.argv) != 4:
+    sys.exit(__doc__)
 board, scale = pd.read_csv(sys.argv[1]), pd.read_csv(sys.argv[2]).dropna(subset=TRUTH)
 readings = board.drop(columns=TIME)
 touch = (readings / readings.median() - 1).abs().sum(axis="columns")
