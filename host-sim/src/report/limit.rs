@@ -34,11 +34,8 @@ fn directions(level: &Level) -> Chart {
         let ratios = seen.signal_to_noise.iter().take(MOST_DIRECTIONS).enumerate();
         ratios.filter(|(_, r)| **r > LEAST_RATIO).map(|(i, r)| [i as f64 + 1.0, *r]).collect()
     };
-    let mut series = Vec::new();
-    if level.by_row.len() > 1 {
-        let all = line(&level.observability);
-        series.push(Series::new("all readings", "c1", Mark::LineAnd(Shape::Square), all));
-    }
+    let all = line(&level.observability);
+    let mut series = vec![Series::new("all readings", "c1", Mark::LineAnd(Shape::Square), all)];
     for (i, row) in level.by_row.iter().enumerate() {
         let name = match &row.row_wires[..] {
             _ if i == 0 => "each row by itself".into(),

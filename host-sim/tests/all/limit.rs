@@ -62,3 +62,15 @@ fn several_scenes_share_a_table_with_the_figures_of_each_alone() {
     let twice = folder.fail(&["limit", "one.toml", "one.toml"], 2);
     assert!(twice.contains("two scenes have the same name"), "{twice}");
 }
+
+#[test]
+fn a_row_by_itself_is_listed_once() {
+    let folder = Folder::new("limit-row");
+    folder.write("scene.toml", small_scene());
+    for (row, count) in [(&["--row", "4"][..], 1), (&[], 3)] {
+        let result = folder.json(&[&["limit", "scene.toml", "-n", "4"], row].concat());
+        for list in ["limits", "directions"] {
+            assert_eq!(result[list].as_array().unwrap().len(), count, "{row:?}: {list}");
+        }
+    }
+}

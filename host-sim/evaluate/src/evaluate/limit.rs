@@ -83,7 +83,7 @@ pub struct Level {
     pub decoders: Vec<DecoderErrors>,
     /// What all readings show.
     pub observability: Observability,
-    /// What each row's readings show.
+    /// What each row's readings show, if there are several rows.
     pub by_row: Vec<Observability>,
 }
 
@@ -152,11 +152,12 @@ fn level(
             .map_err(|refusal| Error::Usage(format!("noise 0: {refusal}")))
     };
     let observability = seen(&world.read_rows)?;
-    let by_row = world.read_rows.iter().map(|row| seen(&[*row])).collect::<Result<_>>()?;
+    let several = if world.read_rows.len() > 1 { &world.read_rows[..] } else { &[] };
+    let by_row = several.iter().map(|row| seen(&[*row])).collect::<Result<_>>()?;
     let all = Reference::new(world, frames, progress);
     let mut limits = vec![Figures::new(&world.read_rows, &all)];
     let width = world.output_names().len() / world.read_rows.len();
-    for (place, &row) in world.read_rows.iter().enumerate().filter(|_| world.read_rows.len() > 1) {
+    for (place, &row) in several.iter().enumerate() {
         // A row that moves by itself is known from its own readings alone.
         let own = if world.motion.has_independent_rows() {
             all.as_ref().map(|all| all.columns(place * width, width)).map_err(Clone::clone)
