@@ -72,7 +72,7 @@ class Model(MultiOutputMixin, RegressorMixin, BaseEstimator):
         Ridge penalty on squared weights per line. With None, cross-validation chooses it for up to 1000 lines, and the
         default of `taxel train` is used for more.
     refine : bool or None
-        Whether centres and widths are refined after K-means, which is more accurate and takes minutes instead of seconds.
+        Whether centres and widths are refined after K-means, which is more accurate and takes several times as long.
         None is True, except for up to 1000 lines without a significant gain on held-out lines.
     select : bool
         Whether those of `centres`, `spread`, `penalty` and `refine` that are None are chosen for any number of lines as for

@@ -83,7 +83,7 @@ fn bracketed(name: &str) -> Option<(&str, &'static str)> {
     Some((name.trim_end(), unit(text.trim())?)).filter(|(name, _)| !name.is_empty())
 }
 
-/// Whether the column called `name` is a resistance in Ω that a device judges: `r4c17_ohm`.
+/// Whether the column called `name` is a resistance in Ω, to be judged by limits: `r4c17_ohm`. A device judges all that it scans.
 pub fn is_judged_in_ohm(name: &str) -> bool {
     name.ends_with("_ohm")
 }

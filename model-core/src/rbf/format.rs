@@ -34,7 +34,7 @@ impl Format {
             Self::Fixed16 => Declaration {
                 name: "fixed16",
                 tag: 2,
-                description: "16-bit fixed point: half the flash, and a sixth of the time",
+                description: "16-bit fixed point: less flash, and a third to a ninth of the time",
             },
         }
     }
