@@ -81,7 +81,8 @@ fn prepared() -> Folder {
     folder.write("table1.toml", small_scene_with_table1());
     let moving = include_str!("../../../scenes/moving.toml");
     let short = moving.replace("duration_s = 0.6", "duration_s = 0.1");
-    folder.write("moving.toml", short.replace("trajectories = 64", "trajectories = 2"));
+    let few = short.replace("trajectories = 64", "trajectories = 2");
+    folder.write("moving.toml", few.replace("test_frames = 8000", "test_frames = 60"));
     let log = log();
     let some = |from: usize, count: usize| {
         let lines = log.lines().take(1).chain(log.lines().skip(from).take(count));

@@ -233,7 +233,7 @@ fn a_contact_that_moves_by_nothing_has_the_limit_of_a_still_one() {
     world.noise.level *= 3.0;
     let timetable = Timetable::every(0.01, 0.01, 0.1).unwrap();
     // Scans are finished at 10 ms, 20 ms, …; nine of them at each moment.
-    let moments_s: Vec<f64> = (0..48).map(|it| 0.09 + 2e-4 * f64::from(it)).collect();
+    let moments_s: Vec<f64> = (0..32).map(|it| 0.09 + 3e-4 * f64::from(it)).collect();
     let moving = Reference::moving(&world, (&timetable, 0.01), &moments_s).unwrap();
     for (still, moving) in still.iter().zip(moving.limits()) {
         let error = still.limit_standard_error.hypot(moving.limit_standard_error);
