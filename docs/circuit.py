@@ -191,7 +191,7 @@ def bill():
 
 
 def own_converters():
-    """Draws how pins drive the rows, and how the board's own converters read the columns by three double-throw switches."""
+    """Draws how pins drive the rows, and how the board's own converters read the columns by nine double-throw switches."""
     wiring.box(0, 30, 130, 470, "NUCLEO-", "F446RE")
     wiring.line("row", (130, 60), (480, 60))
     wiring.text(136, 54, f"{ROW_PINS[0]}–{', '.join(ROW_PINS[5:])}: to IN 1 … {ROWS}", kind="small")
