@@ -8,14 +8,14 @@
 #![doc = include_str!("../README.md")]
 
 pub mod error;
-mod target;
-mod weights;
-mod samples;
+pub mod target;
+pub mod weights;
+pub mod samples;
 mod slopes;
 mod mixture;
 mod maps;
-mod population;
-mod frame;
+pub mod population;
+pub mod frame;
 pub mod limit;
 mod moving;
 pub mod reference;

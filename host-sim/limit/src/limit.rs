@@ -39,14 +39,16 @@ struct Group {
     /// Standard deviation of each reading in Ω; empty for noise relative to the reading.
     deviation_ohm: Vec<f64>,
     /// Samples of the prior of each kind of motion.
-    priors: Vec<Prior>,
+    priors: Vec<PriorSamples>,
 }
 
 /// Samples of the prior, in lanes, with their ideal readings.
 #[derive(Debug, Clone)]
-struct Prior {
-    samples: Samples,
-    ideal_ohm: Vec<Lanes>,
+pub struct PriorSamples {
+    /// Latents, without likelihoods.
+    pub samples: Samples,
+    /// Ideal readings in Ω of each [`LANES`] samples, one after the other.
+    pub ideal_ohm: Vec<Lanes>,
 }
 
 /// Posterior of one frame.
@@ -94,7 +96,8 @@ impl Limit {
                 deviations_ohm[place * readings..][..rows.len() * world.sensor.column_wires]
                     .to_vec()
             };
-            let priors = kinds.iter().map(|(share, kind)| prior(kind, *share, rows)).collect();
+            let of_kind = |(share, kind): &(f64, World)| PriorSamples::new(kind, *share, rows);
+            let priors = kinds.iter().map(of_kind).collect();
             Group { rows: rows.to_vec(), deviation_ohm, priors }
         });
         Ok(Self { groups: groups.collect(), kinds, world: world.clone() })
@@ -103,6 +106,11 @@ impl Limit {
     /// World whose limit it is.
     pub fn world(&self) -> &World {
         &self.world
+    }
+
+    /// Standard deviation of each reading of a frame in Ω; empty for noise relative to the reading.
+    pub fn deviation_ohm(&self) -> Vec<f64> {
+        self.groups.iter().flat_map(|group| &group.deviation_ohm).copied().collect()
     }
 
     /// Samples the posterior of every frame of `readings_ohm`, frame after frame.
@@ -142,7 +150,7 @@ impl Limit {
     /// Appends the posterior of one group of rows.
     fn decode_group(
         &self,
-        priors: &[Prior],
+        priors: &[PriorSamples],
         rows: &[Rows<'_>],
         readings_ohm: &[f64],
         posterior: &mut Posterior,
@@ -153,7 +161,7 @@ impl Limit {
         let (seed, part) =
             (self.world.seed, rows[0].wires.first().map_or(0, |row| *row as u64 + 1));
         let mut random = Random::new(seed, Stream::Test, Purpose::Posterior, digest(&bytes), part);
-        let start = |(prior, rows): (&Prior, &Rows<'_>)| {
+        let start = |(prior, rows): (&PriorSamples, &Rows<'_>)| {
             let mut start = prior.samples.clone();
             for ideal_ohm in prior.ideal_ohm.chunks_exact(readings_ohm.len()) {
                 start.log_likelihood.extend(rows.log_likelihood(readings_ohm, ideal_ohm));
@@ -171,32 +179,35 @@ impl Limit {
     }
 }
 
-/// Samples of the prior of `rows`, with their ideal readings, for a motion with this share.
-fn prior(world: &World, share: f64, rows: &[usize]) -> Prior {
-    let model = LaneModel::new(&world.sensor);
-    let rows = Rows { world, motion: &*world.motion, model, wires: rows, deviation_ohm: &[] };
-    let n = rows.latents();
-    let part = rows.wires.first().map_or(0, |row| *row as u64 + 1);
-    let draw = |memory: &mut Memory, number: usize| {
-        let (seed, number) = (world.seed, number as u64);
-        let mut random = Random::new(seed, Stream::Span, Purpose::Posterior, number, part);
-        let mut latents = vec![[0.0; LANES]; n];
-        latents.as_flattened_mut().fill_with(|| random.normal());
-        let ideal_ohm = rows.ideal_ohm(&latents, memory).to_vec();
-        (latents, ideal_ohm)
-    };
-    let numbers = (0..PRIOR_SAMPLES / LANES).into_par_iter();
-    let drawn: Vec<(Vec<Lanes>, Vec<Lanes>)> = numbers.map_init(|| rows.memory(), draw).collect();
-    let mut samples = Samples::new(n, share.ln());
-    let mut ideal_ohm = Vec::with_capacity(drawn.len() * rows.readings());
-    for (latents, readings) in drawn {
-        for lane in 0..LANES {
-            samples.places.extend(latents.iter().map(|latent| latent[lane]));
+impl PriorSamples {
+    /// Draws samples of the prior of `rows` (from 0), for the motion of `world` with this share in a mix.
+    pub fn new(world: &World, share: f64, rows: &[usize]) -> Self {
+        let model = LaneModel::new(&world.sensor);
+        let rows = Rows { world, motion: &*world.motion, model, wires: rows, deviation_ohm: &[] };
+        let n = rows.latents();
+        let part = rows.wires.first().map_or(0, |row| *row as u64 + 1);
+        let draw = |memory: &mut Memory, number: usize| {
+            let (seed, number) = (world.seed, number as u64);
+            let mut random = Random::new(seed, Stream::Span, Purpose::Posterior, number, part);
+            let mut latents = vec![[0.0; LANES]; n];
+            latents.as_flattened_mut().fill_with(|| random.normal());
+            let ideal_ohm = rows.ideal_ohm(&latents, memory).to_vec();
+            (latents, ideal_ohm)
+        };
+        let numbers = (0..PRIOR_SAMPLES / LANES).into_par_iter();
+        let drawn: Vec<(Vec<Lanes>, Vec<Lanes>)> =
+            numbers.map_init(|| rows.memory(), draw).collect();
+        let mut samples = Samples::new(n, share.ln());
+        let mut ideal_ohm = Vec::with_capacity(drawn.len() * rows.readings());
+        for (latents, readings) in drawn {
+            for lane in 0..LANES {
+                samples.places.extend(latents.iter().map(|latent| latent[lane]));
+            }
+            ideal_ohm.extend(readings);
         }
-        ideal_ohm.extend(readings);
+        samples.log_prior = vec![0.0; PRIOR_SAMPLES];
+        Self { samples, ideal_ohm }
     }
-    samples.log_prior = vec![0.0; PRIOR_SAMPLES];
-    Prior { samples, ideal_ohm }
 }
 
 impl FrameDecoder for Limit {
@@ -220,6 +231,3 @@ impl FrameDecoder for Limit {
         Estimates { values, deviation: Some(deviation), novelty: None }
     }
 }
-
-#[cfg(test)]
-mod tests;

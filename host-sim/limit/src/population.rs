@@ -77,7 +77,7 @@ pub fn sample<T: Target>(
     let mut kept: Vec<Samples> =
         kinds().map(|(target, prior)| populate(target, prior, effort, random, memory)).collect();
     let mut thin = Vec::new();
-    for (kind, (target, prior)) in kinds().enumerate().filter(|(kind, _)| kept[*kind].len() == 0) {
+    for (kind, (target, prior)) in kinds().enumerate().filter(|(kind, _)| kept[*kind].is_empty()) {
         let tops = tops(target, &starts(prior, effort, random), memory);
         thin.push((kind, Maps::new(target, tops, memory)));
     }
@@ -114,7 +114,7 @@ fn populate<T: Target>(
     let (mut population, mut kept) = (none.clone(), none.clone());
     for _ in 0..effort.rounds {
         // Samples of the prior are too far apart to be of use later.
-        let from = if population.len() == 0 { prior } else { &population };
+        let from = if population.is_empty() { prior } else { &population };
         let power = largest_power(&from.log_prior, &from.log_likelihood, effort.fitted);
         let log = tempered(&from.log_prior, &from.log_likelihood, power);
         let mixture = Mixture::fit(from, &normalised(&log), random);
@@ -218,6 +218,3 @@ pub fn moments<T: Target>(targets: &[T], kinds: &[Samples], memory: &mut T::Memo
 
 /// Share of a weight in the sum below which it is left out.
 const NEGLIGIBLE: f64 = 1e-14;
-
-#[cfg(test)]
-mod tests;

@@ -29,6 +29,11 @@ impl Samples {
         self.log_prior.len()
     }
 
+    /// Whether there is no sample.
+    pub fn is_empty(&self) -> bool {
+        self.log_prior.is_empty()
+    }
+
     /// Latents of a sample.
     pub fn place(&self, number: usize) -> &[f64] {
         &self.places[number * self.latents..][..self.latents]

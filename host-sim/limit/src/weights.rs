@@ -52,15 +52,3 @@ pub fn largest_power(prior: &[f64], likelihood: &[f64], wanted: f64) -> f64 {
     }
     f64::exp(low)
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn equal_weights_are_all_effective_and_one_weight_is_one() {
-        assert!((effective(&normalised(&[-3.0; 10])) - 10.0).abs() < 1e-12);
-        assert!((effective(&normalised(&[0.0, -800.0, -900.0])) - 1.0).abs() < 1e-12);
-        assert_eq!(effective(&normalised(&[f64::NEG_INFINITY; 3])), 0.0);
-    }
-}

@@ -1,19 +1,22 @@
 //! The limit against figures that were computed independently, and against what must not change it.
 
 use nalgebra::DMatrix;
-use taxel_learn::Decoder;
+use taxel_data::{LANES, Lanes, Purpose, Random, Silent, Stream};
+use taxel_learn::{Decoder, FrameDecoder};
+use taxel_limit::frame::{Frame, Rows};
+use taxel_limit::limit::PriorSamples;
+use taxel_limit::target::Target;
+use taxel_limit::{Limit, Reference, Refusal};
+use taxel_simulate::drift::Drift;
 use taxel_simulate::motion::{Dent, Kind, Mix, Part};
 use taxel_simulate::noise::{Noise, NoiseKind};
 use taxel_simulate::outputs::{ContactOutput, Outputs};
 use taxel_simulate::path::Path;
 use taxel_simulate::profile::Profile;
 use taxel_simulate::rubber::StandardLinearSolid;
+use taxel_simulate::sensor::LaneModel;
 use taxel_simulate::timetable::Timetable;
-use taxel_simulate::{drift::Drift, synthesise};
-
-use super::*;
-use crate::reference::Reference;
-use crate::target::Target;
+use taxel_simulate::{Synthesis, World, synthesise};
 
 /// Limits of z on scene `press` in mm, by an independent program: noise level, RMSE, and its standard error. The first two
 /// of each list are tried, or as many as `TAXEL_CASES` says.
@@ -46,6 +49,12 @@ fn limits_agree_with_independent_figures() {
     }
 }
 
+/// These rows of a world.
+fn rows<'w>(world: &'w World, wires: &'w [usize]) -> Rows<'w> {
+    let model = LaneModel::new(&world.sensor);
+    Rows { world, motion: &*world.motion, model, wires, deviation_ohm: &[] }
+}
+
 /// Where noise is low, the posterior is normal, and its covariance that of Cramér and Rao with the prior (van Trees):
 /// G·(I + JᵀJ)⁻¹·Gᵀ, with the slopes J of readings over their noise, and G of outputs, over the latents.
 #[test]
@@ -57,7 +66,7 @@ fn low_noise_comes_to_the_cramer_rao_bound() {
         world.outputs = Outputs::Contact(vec![ContactOutput::Centre, ContactOutput::Depth]);
         world.noise.level = level;
         let limit = Limit::new(&world).unwrap();
-        let rows = limit.rows(&limit.groups[0]).remove(0);
+        let rows = rows(&world, &world.read_rows);
         let (n, mut memory) = (rows.latents(), rows.memory());
         // A frame a lane: at least a radius from the edges. Differences of each latent stand in lanes of their own.
         let mut random = Random::new(7, Stream::Test, Purpose::Contact, 0, 0);
@@ -156,14 +165,8 @@ fn latents_have_the_distribution_that_frames_are_drawn_from() {
     for motion in dents.map(Kind::from).into_iter().chain([World::paper().motion]) {
         world.motion = motion;
         let drawn = Synthesis::new(&world).frames(Stream::Test, 20_000).outputs;
-        let prior = prior(&world, 1.0, &[1]);
-        let rows = Rows {
-            world: &world,
-            motion: &*world.motion,
-            model: LaneModel::new(&world.sensor),
-            wires: &[1],
-            deviation_ohm: &[],
-        };
+        let prior = PriorSamples::new(&world, 1.0, &[1]);
+        let rows = rows(&world, &[1]);
         let (frame, mut memory) = (Frame { rows: &rows, readings_ohm: &[] }, rows.memory());
         let mut sums = vec![[0.0; 2]; drawn.names.len()];
         let mut values = vec![[0.0; LANES]; sums.len()];
@@ -214,9 +217,8 @@ fn noise_of_a_span_is_that_of_each_row() {
     let limit = Limit::new(&world).unwrap();
     let spans_ohm = Synthesis::new(&world).noise_unit_ohm();
     let expected: Vec<f64> = spans_ohm.iter().map(|span| world.noise.level * span).collect();
-    let found: Vec<f64> = limit.groups.iter().flat_map(|it| it.deviation_ohm.clone()).collect();
-    assert!(limit.groups.len() > 1);
-    assert_eq!(found, expected);
+    assert!(world.motion.has_independent_rows() && world.read_rows.len() > 1);
+    assert_eq!(limit.deviation_ohm(), expected);
 }
 
 /// A contact that is held where it is tells as much in n frames of the noise √n·p as in one of the noise p.
