@@ -14,6 +14,8 @@ use crate::output;
 /// Numbers formatted as one piece, and pieces formatted at a time.
 const PIECE: usize = 16 * 1024;
 const PIECES: usize = 64;
+/// Numbers that are formatted at a time, on all cores.
+pub const NUMBERS_AT_A_TIME: usize = PIECE * PIECES;
 
 /// Column of a CSV file that is written: its name, and what its fields are.
 #[derive(Debug, Clone, Copy)]
@@ -194,70 +196,4 @@ fn lies_in_the_middle(value: f64, digits: &str) -> bool {
     let decimals = digits.find('.').map_or(0, |point| digits.len() - point - 1);
     let multiple = value * f64::from_bits((1023 + 1 + decimals as u64) << 52);
     digits.len() > UNAMBIGUOUS + 1 && multiple == multiple.trunc()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::random::{Purpose, Random, Stream};
-
-    #[test]
-    fn numbers_are_written_as_display_writes_them() {
-        let mut random = Random::new(1, Stream::Test, Purpose::Damage, 0, 0);
-        let drawn =
-            (0..200_000).map(|_| (random.unit() - 0.5) * 10_f64.powf(40.0 * random.unit() - 20.0));
-        let odd =
-            [0.0, -0.0, 1.0, -1e15, 1e16, 1e17, 1e300, 5e-324, 0.1, 1e-5, 1e-4, f64::INFINITY];
-        let drawn: Vec<f64> = drawn.collect();
-        let rounded: Vec<f64> = drawn.iter().map(|value| f64::from(*value as f32)).collect();
-        for value in drawn.into_iter().chain(rounded).chain(odd) {
-            let mut text = Vec::new();
-            write_number(&mut text, value);
-            assert_eq!(String::from_utf8(text).unwrap(), value.to_string());
-        }
-    }
-
-    #[test]
-    fn numbers_of_an_f32_get_its_shortest_digits() {
-        let text = |value: f64| {
-            let mut text = Vec::new();
-            write_f32(&mut text, value);
-            String::from_utf8(text).unwrap()
-        };
-        for (value, digits) in [
-            (0.007_460_668_f32, "0.007460668"),
-            (0.1, "0.1"),
-            (-3.0, "-3"),
-            (16_777_216.0, "16777216"),
-            (1e-9, "0.000000001"),
-        ] {
-            assert_eq!(text(f64::from(value)), digits);
-        }
-        assert_eq!(text(f64::NAN), "");
-        assert_eq!(text(1_743_486_221.590_758), "1743486221.590758"); // no f32
-        let mut random = Random::new(2, Stream::Test, Purpose::Damage, 0, 0);
-        for _ in 0..100_000 {
-            let value = ((random.unit() - 0.5) * 10_f64.powf(20.0 * random.unit() - 10.0)) as f32;
-            let digits = text(f64::from(value));
-            assert_eq!(digits.parse::<f32>().unwrap().to_bits(), value.to_bits());
-            assert!(digits.len() <= value.to_string().len(), "{digits} for {value}");
-        }
-    }
-
-    #[test]
-    fn lines_keep_their_order_over_many_pieces() {
-        let folder = std::env::temp_dir().join(format!("taxel-write-{}", std::process::id()));
-        std::fs::create_dir_all(&folder).unwrap();
-        let path = folder.join("data.csv");
-        let count = 3 * PIECE * PIECES / 2;
-        write(&path, ["a", "b"], (0..count).map(|i| [i as f64, f64::NAN])).unwrap();
-        let text = std::fs::read_to_string(&path).unwrap();
-        std::fs::remove_dir_all(&folder).unwrap();
-        let mut lines = text.lines();
-        assert_eq!(lines.next(), Some("a,b"));
-        for i in 0..count {
-            assert_eq!(lines.next(), Some(&*format!("{i},")));
-        }
-        assert_eq!(lines.next(), None);
-    }
 }

@@ -11,11 +11,12 @@ use crate::digest;
 use crate::error::{Error, Problem, Result};
 use crate::input::{MOST_DATA_BYTES, Source};
 
-mod time;
-mod csv;
+pub mod time;
+pub mod csv;
 mod blocks;
 mod dialect;
 
+pub use blocks::BLOCK;
 pub use dialect::{Separator, Stated};
 
 /// Data file that was read: named columns of numbers, one frame a line.
@@ -36,8 +37,8 @@ pub struct DataFile {
     pub found: String,
     /// Lines of data (from 0) that are kept.
     pub(crate) kept: Range<usize>,
-    /// Values of all lines.
-    pub(crate) values: Vec<f64>,
+    /// Values of all lines, those that are not kept included, one line after the other.
+    pub values: Vec<f64>,
     /// Line number in the file (from 1) of each line of data, of all.
     pub(crate) line_numbers: Vec<u64>,
     /// Fields of a CSV file, if they are wanted as they are written.

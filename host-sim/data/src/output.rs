@@ -226,6 +226,3 @@ fn written_in(folder: &Path, contents: &[(&str, &[u8])]) -> Result<Vec<Temporary
     }
     written
 }
-
-#[cfg(test)]
-mod tests;

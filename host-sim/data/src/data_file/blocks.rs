@@ -5,8 +5,8 @@ use super::dialect::{Dialect, Encoding};
 use crate::error::{Error, Result};
 use crate::input::Source;
 
-/// Bytes that are read at a time.
-pub(super) const BLOCK: usize = 4 * 1024 * 1024;
+/// Bytes of a text file that are read at a time.
+pub const BLOCK: usize = 4 * 1024 * 1024;
 
 /// UTF-8's byte order mark.
 const MARK: &[u8] = b"\xef\xbb\xbf";

@@ -8,7 +8,7 @@ use crate::columns::some_names;
 use crate::error::{Error, Problem, Result};
 use crate::input::Source;
 
-mod body;
+pub mod plain;
 
 /// Bytes that end lines.
 const ENDS: [u8; 2] = *b"\n\r";
@@ -219,7 +219,7 @@ impl Body {
         if self.seen.iter().any(|seen| seen.time) {
             return None;
         }
-        body::read(lines, columns, &mut self.file.values)?;
+        plain::read(lines, columns, &mut self.file.values)?;
         let added = &self.file.values[before..];
         for (column, seen) in self.seen.iter_mut().enumerate().filter(|(_, seen)| !seen.number) {
             seen.number = added.iter().skip(column).step_by(columns).any(|value| !value.is_nan());
@@ -362,6 +362,3 @@ pub(super) fn number(field: &[u8]) -> Option<f64> {
         Err(_) => MISSING.iter().any(|word| word.eq_ignore_ascii_case(text)).then_some(f64::NAN),
     }
 }
-
-#[cfg(test)]
-mod tests;

@@ -463,6 +463,3 @@ fn with_unit(name: &str, unit: &str) -> String {
         _ => name.to_owned(),
     }
 }
-
-#[cfg(test)]
-mod tests;

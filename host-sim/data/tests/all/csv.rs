@@ -1,62 +1,60 @@
-use super::*;
-use crate::data_file::Stated;
-use crate::random::{Purpose, Random, Stream};
+//! CSV text as it is parsed: lines, fields, and what is damaged.
+
 use std::path::Path;
 
-/// The text as it is parsed, of any dialect.
+use taxel_data::data_file::csv::plain;
+use taxel_data::data_file::{BLOCK, Reading, Stated};
+use taxel_data::{DataFile, Purpose, Random, Result, Stream};
+
 fn parse(path: &Path, bytes: &[u8], has_header: bool) -> Result<DataFile> {
-    super::parse(Source::of_bytes(path, bytes), &Reading { has_header, ..Reading::default() })
+    DataFile::parse(path, bytes, &Reading { has_header, ..Reading::default() })
 }
 
-/// Body of a file with the header of a plain text, and the lines of data.
-fn body(text: &[u8]) -> (Body, &[u8]) {
-    let mut file = DataFile { path: "test.csv".into(), ..DataFile::default() };
-    let start = read_header(&mut file, text, true).unwrap();
-    let seen = file.header.iter().map(|_| Seen::default()).collect();
-    let line = 1 + line_ends(&text[..start]);
-    (Body { file, seen, line, is_strict: true, cut: 0, first: None }, &text[start..])
-}
-
-/// What the careful reader finds in a plain text.
-fn carefully(text: &[u8]) -> Result<DataFile> {
-    let (mut body, lines) = body(text);
-    body.add_carefully(lines, true).map(|_| body.file)
-}
-
-fn bits(values: &[f64]) -> Vec<u64> {
-    values.iter().map(|value| value.to_bits()).collect()
+/// Bits of all values, and numbers of all lines.
+fn bits(file: &DataFile) -> (Vec<u64>, Vec<u64>) {
+    let lines = 0..file.lines();
+    (
+        file.values.iter().map(|value| value.to_bits()).collect(),
+        lines.map(|line| file.line_number(line)).collect(),
+    )
 }
 
 #[test]
 fn the_quick_reader_reads_what_the_careful_one_reads() {
-    for (text, is_plain) in [
-        ("a,b\n1,2\n3,4\n", true),
-        ("a,b\r\n1,2\r\n3,4\r\n", true),
-        ("a,b\n1,2\n3,4", true),
-        ("a,b\r\n1,2\r\n3,4", true),
-        ("\n\na,b\n1,2\n", true),
-        ("\"a\",b\n-1e-3,+2.5E7\n.5,7.\n", true),
-        ("a,b\n,\nNaN,\nnan,-nan\n", true),
-        ("a,b\n 1 ,\t2\n  ,3\n", true),
-        ("a\n1\n2\n", true),
-        ("a,b\n123456789012345678901234567890,0.1000000000000000055511151231257827\n", true),
-        ("a,b\n4.9406564584124654e-324,1.7976931348623157e308\n", true),
-        ("a,b\n\"1\",2\n", false),
-        ("a,b\n1,2\n\n3,4\n", false),
-        ("a,b\n1,2\n3,4\n\n", false),
-        ("a,b\r1,2\r3,4\r", false),
-        ("a,b\n1,2\r3,4\n", false),
-        ("\u{feff}a,b\n1,2\n", true),
-        ("a,b\n\u{a0}1,2\n", true),
+    for (header, lines, is_plain) in [
+        ("a,b\n", "1,2\n3,4\n", true),
+        ("a,b\r\n", "1,2\r\n3,4\r\n", true),
+        ("a,b\n", "1,2\n3,4", true),
+        ("a,b\r\n", "1,2\r\n3,4", true),
+        ("\n\na,b\n", "1,2\n", true),
+        ("\"a\",b\n", "-1e-3,+2.5E7\n.5,7.\n", true),
+        ("a,b\n", ",\nNaN,\nnan,-nan\n", true),
+        ("a,b\n", " 1 ,\t2\n  ,3\n", true),
+        ("a\n", "1\n2\n", true),
+        ("a,b\n", "123456789012345678901234567890,0.1000000000000000055511151231257827\n", true),
+        ("a,b\n", "4.9406564584124654e-324,1.7976931348623157e308\n", true),
+        ("a,b\n", "\"1\",2\n", false),
+        ("a,b\n", "1,2\n\n3,4\n", false),
+        ("a,b\n", "1,2\n3,4\n\n", false),
+        ("a,b\r", "1,2\r3,4\r", false),
+        ("a,b\n", "1,2\r3,4\n", false),
+        ("\u{feff}a,b\n", "1,2\n", true),
+        ("a,b\n", "\u{a0}1,2\n", true),
     ] {
-        let file = parse(Path::new("test.csv"), text.as_bytes(), false).unwrap();
-        let text = text.strip_prefix('\u{feff}').unwrap_or(text);
-        let careful = carefully(text.as_bytes()).unwrap();
-        assert_eq!(bits(&file.values), bits(&careful.values), "{text:?}");
-        assert_eq!(file.line_numbers, careful.line_numbers, "{text:?}");
-        let (mut body, lines) = body(text.as_bytes());
-        let quick = body.add_plain(lines);
-        assert_eq!(quick.is_some(), is_plain, "{text:?}");
+        let columns = 1 + header.matches(',').count();
+        let read = |text: &str| parse(Path::new("test.csv"), text.as_bytes(), false).unwrap();
+        let (values, numbers) = bits(&read(&[header, lines].concat()));
+        // A line in quotes before the others leaves all to the careful reader.
+        let end = header.trim_start_matches('\n').trim_start_matches(|it: char| !it.is_control());
+        let first = ["\"7\""; 2][..columns].join(",") + end;
+        let (careful, moved) = bits(&read(&[header, &first, lines].concat()));
+        assert_eq!(values, careful[columns..], "{lines:?}");
+        let careful: Vec<u64> = moved[1..].iter().map(|number| number - 1).collect();
+        assert_eq!(numbers, careful, "{lines:?}");
+        for (lines, is_plain) in [(lines.to_owned(), is_plain), (first + lines, false)] {
+            let quick = plain::read(lines.as_bytes(), columns, &mut vec![]);
+            assert_eq!(quick.is_some(), is_plain, "{lines:?}");
+        }
     }
 }
 
@@ -85,11 +83,12 @@ fn what_is_wrong_is_left_to_the_careful_reader() {
         let refused = file.unwrap().column("b").unwrap_err().to_string();
         assert!(refused.contains(&format!("{field:?} is not a number")), "{refused}");
     }
-    for text in ["a,b\n1,2\n3\n", "a,b\n1,2,3\n4,5,6\n"] {
-        let message = parse(Path::new("test.csv"), text.as_bytes(), false).unwrap_err();
-        let careful = carefully(text.as_bytes()).unwrap_err();
-        let says = careful.to_string().replace("test.csv: ", "");
-        assert!(message.to_string().ends_with(&says), "{text:?}: {message}");
+    for (text, says) in [
+        ("a,b\n1,2\n3\n", "line 3 has 1 fields; the header names 2"),
+        ("a,b\n1,2,3\n4,5,6\n", "line 2 has 3 fields; the header names 2"),
+    ] {
+        let refused = parse(Path::new("test.csv"), text.as_bytes(), false).unwrap_err().to_string();
+        assert!(refused.contains(says), "{text:?}: {refused}");
     }
 }
 
@@ -115,7 +114,7 @@ fn files_of_many_blocks_are_read_whole_and_faults_in_them_found() {
         let latin_1: Vec<u8> = text.chars().map(|char| char as u8).collect();
         let stated = Stated { separator: separator.parse().ok(), decimal_comma: Some(false) };
         let reading = Reading { keeps_text: true, stated, ..Reading::default() };
-        let file = super::parse(Source::of_bytes(path, &latin_1), &reading).unwrap();
+        let file = DataFile::parse(path, &latin_1, &reading).unwrap();
         assert_eq!((file.lines(), &*file.header[1]), (lines, "b (µm)"));
         let of_a_line = if line_break.trim_end_matches(' ').is_empty() { 1 } else { 2 };
         for line in 0..lines {
@@ -232,7 +231,8 @@ fn words_for_missing_values_and_unnamed_columns_are_recognised() {
     let path = Path::new("test.csv");
     let file = parse(path, b",a,\n0,N/A,1\n1,na,null\n2,-,?\n", false).unwrap();
     assert_eq!(file.header, ["c1", "a", "c3"]);
-    assert!((0..3).all(|line| file.value(line, 1).is_nan()) && file.not_numbers.is_empty());
+    assert!((0..3).all(|line| file.value(line, 1).is_nan()));
+    file.check_numbers(&[0, 1, 2]).unwrap();
     let refused = parse(path, b",c1\n1,2\n", false).unwrap_err().to_string();
     assert!(refused.contains("header: column \"c1\" appears twice"), "{refused}");
 }

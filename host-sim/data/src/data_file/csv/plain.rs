@@ -10,7 +10,7 @@ const PIECE: usize = 256 * 1024;
 
 /// Appends the values of CSV `lines` of so many `columns`, NaN where one is missing; `None`, and nothing is appended, if
 /// the lines are not plain.
-pub(super) fn read(lines: &[u8], columns: usize, values: &mut Vec<f64>) -> Option<()> {
+pub fn read(lines: &[u8], columns: usize, values: &mut Vec<f64>) -> Option<()> {
     let read = pieces(lines).into_par_iter().map(|piece| read_piece(piece, columns));
     let read: Option<Vec<Vec<f64>>> = read.collect();
     read?.iter().for_each(|piece| values.extend_from_slice(piece));

@@ -1,12 +1,17 @@
+//! Output files: whole or not there, whichever step fails.
+
 use std::cell::{Cell, RefCell};
 use std::collections::BTreeSet;
 use std::fs::{self, Permissions};
-use std::path::PathBuf;
+use std::io::ErrorKind;
+use std::path::{Path, PathBuf};
 use std::rc::Rc;
 
+use taxel_data::Result;
+use taxel_data::output::{
+    FileSet, Inner, Step, Written, check_writable, watched, write_bytes, write_folder,
+};
 use tempfile::TempDir;
-
-use super::*;
 
 const SET: FileSet = FileSet { files: &["model", "metrics", "table"], inner: INNER };
 const INNER: Inner = Inner { folder: "inner", names: &["a", "level-*"], endings: &["svg", "csv"] };

@@ -1,7 +1,9 @@
+//! Dialects of text files: how they are found, and when they are refused.
+
 use std::path::Path;
 
-use crate::data_file::{DataFile, Reading, Separator, Stated};
-use crate::error::Result;
+use taxel_data::data_file::{Reading, Separator, Stated};
+use taxel_data::{DataFile, Result};
 
 fn read(bytes: &[u8], stated: Stated) -> Result<DataFile> {
     DataFile::parse(Path::new("log.csv"), bytes, &Reading { stated, ..Reading::default() })
