@@ -21,7 +21,7 @@ use lanes::LaneSynthesis;
 /// Number of frames of the untouched sensor whose mean is a baseline, unless a user says otherwise.
 pub const BASELINE_FRAMES: usize = 100;
 /// Number of frames that measure a channel's maximum and minimum over the world, for `span` noise.
-const SPAN_FRAMES: usize = 4096;
+pub const SPAN_FRAMES: usize = 4096;
 
 /// Synthesis of frames of a world, with some of its settings replaced.
 #[derive(Debug, Clone)]
@@ -246,6 +246,3 @@ impl<'w> Synthesis<'w> {
         ideal.inputs.ranges().into_iter().map(|[low, high]| high - low).collect()
     }
 }
-
-#[cfg(test)]
-mod tests;

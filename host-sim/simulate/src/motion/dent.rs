@@ -70,7 +70,10 @@ impl Dent {
     }
 
     /// Contact from numbers on [0, 1]: one each for the centre's x and y, the quantities of the form, and the depth.
-    fn of_units(&self, mut units: Vec<Lanes>, shear: &[Lanes; 2], sensor: &Sensor) -> Contact {
+    ///
+    /// # Panics
+    /// If there are fewer.
+    pub fn of_units(&self, mut units: Vec<Lanes>, shear: &[Lanes; 2], sensor: &Sensor) -> Contact {
         let [x_mm, y_mm, _] = sensor.size_mm;
         let of_form = &self.quantities[..self.profile.quantities().len()];
         let ranges = [&[[0.0, x_mm], [0.0, y_mm]], of_form, &[self.dent_depth_mm]].concat();
@@ -183,6 +186,3 @@ impl Motion for Dent {
         Some(self.of_units(units, &shear, sensor))
     }
 }
-
-#[cfg(test)]
-mod tests;

@@ -1,8 +1,12 @@
-use taxel_data::Stream;
+//! Contacts: their depths, forces and motions.
 
-use super::*;
-use crate::motion::{Kind, Mix, Part};
-use crate::sensor::Vector3;
+use std::f64::consts::TAU;
+
+use taxel_data::{LANES, Stream};
+use taxel_simulate::contact::Contact;
+use taxel_simulate::motion::{Dent, Draws, Kind, Mix, Motion, Part};
+use taxel_simulate::profile::Profile;
+use taxel_simulate::sensor::{Sensor, Vector3};
 
 /// Contact 0.5 mm deep, sheared by up to 0.4, with these values of its quantities.
 fn dent(profile: Profile, values: &[f64]) -> Dent {
