@@ -49,7 +49,8 @@ enum Command {
     /// Run everything that CI runs, and go on after a failure. A summary at the end has each step's time and the number
     /// of tests that passed.
     Ci,
-    /// Check that no crate depends on one above it or on one that it does not use, and that no name is too long.
+    /// Check that no crate depends on one above it or on one that it does not use, that all tests run, and that no name is
+    /// too long.
     Structure,
     /// Build and lint all code for a device (thumbv7em-none-eabihf), and prove by linking that it cannot panic.
     Firmware {

@@ -1,5 +1,5 @@
-//! Check of the workspace's structure: which crate may depend on which, that it uses what it depends on, and that names are
-//! short. Here a new crate is declared.
+//! Check of the workspace's structure: which crate may depend on which, that it uses what it depends on, that all tests run,
+//! and that names are short. Here a new crate is declared.
 
 use std::fs;
 use std::path::Path;
@@ -34,14 +34,17 @@ const PRODUCT: usize = DEVICE.len() + DESK.len();
 /// Most letters of the name of a function or a test.
 const LONGEST_NAME: usize = 60;
 
-/// Fails if a crate depends on one above it, or on one that it does not use, or is not declared; or if a name is too long.
+/// Fails if a crate depends on one above it, or on one that it does not use, or is not declared, or has tests that never run;
+/// or if a name is too long.
 pub fn run() -> Outcome {
     let metadata = metadata()?;
     let mut broken = broken(&metadata);
     for package in metadata["packages"].as_array().into_iter().flatten() {
         let manifest = Path::new(package["manifest_path"].as_str().unwrap_or_default());
-        let code = sources(manifest.parent().unwrap_or(manifest));
+        let folder = manifest.parent().unwrap_or(manifest);
+        let code = sources(folder);
         broken.extend(unused(package, &code));
+        broken.extend(never_run(package, &sources(&folder.join("src"))));
         broken.extend(long_names(&code).map(|name| {
             format!("{name} has {} letters: give it at most {LONGEST_NAME}", name.len())
         }));
@@ -83,6 +86,17 @@ fn uses(code: &str, name: &str) -> bool {
             before.ends_with("use ") && [";", " as "].iter().any(|it| after.starts_with(it));
         begins && (after.starts_with("::") || is_import)
     })
+}
+
+/// What is wrong with a package whose code in `src`, without comments, has tests that `cargo test` never runs.
+fn never_run(package: &Value, code: &str) -> Option<String> {
+    let own = ["lib", "cdylib", "bin"].map(Value::from);
+    let mut targets = package["targets"].as_array().into_iter().flatten();
+    let runs = targets.any(|it| own.contains(&it["kind"][0]) && it["test"] == true);
+    let has_tests = ["#[cfg(test)]", "#[test]"].iter().any(|it| code.contains(it));
+    let why =
+        "has tests in src, which never run by its Cargo.toml (test = false): move them to tests/";
+    (has_tests && !runs).then(|| format!("{} {why}", package["name"]))
 }
 
 /// Names of functions, in Rust and in Python, that are too long.
@@ -173,6 +187,20 @@ mod tests {
             assert_eq!(unused(code), ["\"a\" does not use \"blue-sky\""], "{code}");
         }
         fs::remove_dir_all(folder).unwrap();
+    }
+
+    #[test]
+    fn tests_that_never_run_are_found() {
+        let refused = |code: &str, targets: &Value| {
+            never_run(&json!({"name": "a", "targets": targets}), code).is_some()
+        };
+        let lib = |test: bool| json!({"kind": ["lib"], "test": test});
+        let integration = json!({"kind": ["test"], "test": true});
+        for code in ["#[cfg(test)]\nmod tests;", "    #[test]\n    fn f() {}"] {
+            assert!(refused(code, &json!([lib(false), integration])), "{code}");
+            assert!(!refused(code, &json!([lib(true), integration])), "{code}");
+        }
+        assert!(!refused("fn test() {}", &json!([lib(false), integration])));
     }
 
     #[test]

@@ -145,6 +145,3 @@ pub fn stand_still(window: &[f64], count: usize) -> bool {
     let next_frames = window.iter().skip(count);
     window.iter().zip(next_frames).all(|(reading, next)| reading.to_bits() == next.to_bits())
 }
-
-#[cfg(test)]
-mod tests;

@@ -141,7 +141,7 @@ pub fn settings_for(noise: f64, movement: Movement, period_us: f64, age_us: f64)
 }
 
 /// Time constant in µs of least expected squared error with this lead, for an output that is used at this age, and that error.
-fn time_constant_for(
+pub fn time_constant_for(
     of_output: [f64; 2],
     period_us: f64,
     [lead_us, age_us]: [f64; 2],
@@ -179,6 +179,3 @@ fn squared_error(
         + age_s * age_s / 2.0;
     noise * noise * variance / (1.0 + theta).powi(3) + (acceleration * lag).powi(2)
 }
-
-#[cfg(test)]
-mod tests;

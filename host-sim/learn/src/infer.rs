@@ -13,11 +13,12 @@ use taxel_core::touch::Touch;
 use taxel_data::simd::LANES;
 use taxel_data::widest;
 
-use self::column::{Column, blank, give, poison, take};
+pub use self::column::Column;
+use self::column::{blank, give, poison, take};
 use crate::parallel;
 
 mod column;
-mod pairs;
+pub mod pairs;
 mod float32;
 mod fixed16;
 mod front;

@@ -256,6 +256,3 @@ fn rest(values: &[f64]) -> Option<[f64; 2]> {
 fn resolution(value: f64) -> f64 {
     f64::from(f32::EPSILON) * value.abs()
 }
-
-#[cfg(test)]
-mod tests;

@@ -13,8 +13,8 @@ use crate::infer::assess_lines;
 use crate::packing::ModelBlob;
 use crate::parallel;
 
-pub(crate) mod factors;
-mod mixture;
+pub mod factors;
+pub mod mixture;
 
 use factors::Factors;
 use mixture::Mixture;
@@ -201,11 +201,8 @@ fn ratios(deviations: &[f32], errors: &[f64], outputs: usize) -> Vec<[f64; 2]> {
 }
 
 /// Quantile of `values`, which are sorted: the least that this share does not exceed; 0 of none.
-pub(crate) fn quantile(values: &mut [f64], share: f64) -> f64 {
+pub fn quantile(values: &mut [f64], share: f64) -> f64 {
     values.sort_unstable_by(f64::total_cmp);
     let place = (values.len() as f64 * share).ceil() as usize;
     values.get(place.clamp(1, values.len().max(1)) - 1).copied().unwrap_or(0.0)
 }
-
-#[cfg(test)]
-mod tests;

@@ -155,7 +155,7 @@ pub fn recalibrate(
 }
 
 /// Training error of each output of a `model`, in its unit; 0 if it never changed.
-fn training_errors(model: &Model<'_>) -> Vec<f64> {
+pub fn training_errors(model: &Model<'_>) -> Vec<f64> {
     let (shape, metadata) = (model.shape(), model.metadata());
     let [rmse, full_scale] = [metadata.training_rmse, metadata.full_scale]
         .map(|values| values.iter().map(f64::from).chain(std::iter::repeat(0.0)));
@@ -402,7 +402,7 @@ impl<'m> Unit<'m> {
 }
 
 /// Whether a press states that nothing touches: all outputs that are no places are 0.
-fn is_untouched(names: &[String], stated: &[f64]) -> bool {
+pub fn is_untouched(names: &[String], stated: &[f64]) -> bool {
     let amounts = names.iter().zip(stated).filter(|(name, _)| !columns::is_place(name));
     let mut amounts = amounts.map(|(_, stated)| *stated).peekable();
     amounts.peek().is_some() && amounts.all(|stated| stated == 0.0)
@@ -420,6 +420,3 @@ fn mean_square(errors: &[f64]) -> f64 {
 fn mean(values: &[f64]) -> f64 {
     values.iter().sum::<f64>() / values.len() as f64
 }
-
-#[cfg(test)]
-mod tests;

@@ -212,6 +212,3 @@ pub(crate) fn solve(root: &[f64], projection: &[f64], n: usize, weights: &mut [f
         w_row.iter_mut().for_each(|w| *w /= row[0]);
     }
 }
-
-#[cfg(test)]
-mod tests;

@@ -30,8 +30,7 @@ pub use format::FittedNetwork;
 pub use found::Found;
 pub use layers::Layers;
 pub use refine::{Examples, FreshFrames, Refinement};
-use samples::Ridge;
-pub use samples::{HiddenLayer, InputScale, Samples, Seen};
+pub use samples::{HiddenLayer, InputScale, Ridge, Samples, Seen};
 pub use start::Start;
 pub use touch::{Features, FittedTouch, Group, Kinds, THRESHOLD};
 pub use trained::{FittedFront, Trained};
@@ -310,7 +309,7 @@ pub fn train_refined(
 
 /// Squared distance ‖a − b‖².
 #[inline(always)]
-pub(crate) fn squared_distance(a: &[f64], b: &[f64]) -> f64 {
+pub fn squared_distance(a: &[f64], b: &[f64]) -> f64 {
     let ((a4, a_rest), (b4, b_rest)) = (a.as_chunks::<4>(), b.as_chunks::<4>());
     let mut sum = [0.0; 4];
     for (a, b) in a4.iter().zip(b4) {
@@ -321,6 +320,3 @@ pub(crate) fn squared_distance(a: &[f64], b: &[f64]) -> f64 {
     let rest: f64 = a_rest.iter().zip(b_rest).map(|(a, b)| (a - b) * (a - b)).sum();
     (sum[0] + sum[1]) + (sum[2] + sum[3]) + rest
 }
-
-#[cfg(test)]
-mod tests;

@@ -4,8 +4,8 @@
 //! printed. The C code repeats the arithmetic of taxel-core operation by operation.
 
 mod name;
-mod template;
-mod numbers;
+pub mod template;
+pub mod numbers;
 mod facts;
 mod selftest;
 mod source;
@@ -87,6 +87,3 @@ pub fn write(blob: &ModelBlob, name: &Name, limits: Option<Limits>, folder: &Pat
     }
     write_folder(folder, &library(blob, name, limits)?)
 }
-
-#[cfg(test)]
-mod tests;

@@ -125,17 +125,3 @@ impl Grid {
         (own == "ohm").then_some((row, column))
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_row_and_a_column_at_once_are_both_told_and_nothing_else() {
-        let names = (1..=3).flat_map(|m| (4..=7).map(move |k| format!("r{m}c{k}_ohm")));
-        let grid = Grid::new(&names.collect::<Vec<_>>()).unwrap();
-        let cross = [2, 4, 5, 6, 7, 10];
-        assert_eq!(grid.wires_of(&cross), [Place::Row(2), Place::Column(6)]);
-        assert_eq!(grid.wires_of(&cross[1..]), [Place::Row(2), Place::Reading(3, 6)]);
-    }
-}

@@ -5,7 +5,7 @@ use taxel_data::simd::LANES;
 /// One number of each of [`LANES`] lines, aligned to the widest vectors.
 #[derive(Debug, Clone, Copy)]
 #[repr(align(64))]
-pub(super) struct Column<T = f32>(pub [T; LANES]);
+pub struct Column<T = f32>(pub [T; LANES]);
 
 impl<T: Copy + Default> Column<T> {
     /// So many columns of zeros.

@@ -13,7 +13,7 @@ use super::column::Column;
 
 /// Adds to each sum the products of the pairs `x` with those of its row of `weights`, modulo 2³². A pair is a word of two
 /// `i16`. Rows are of equal length; only the last words of each, one for each of `x`, are weights.
-pub(super) fn add_products(x: &[Column<u32>], weights: &[u32], sums: &mut [Column<i32>]) {
+pub fn add_products(x: &[Column<u32>], weights: &[u32], sums: &mut [Column<i32>]) {
     #[cfg(target_arch = "x86_64")]
     if std::is_x86_feature_detected!("avx512bw") {
         if std::is_x86_feature_detected!("avx512vnni") {
@@ -32,7 +32,7 @@ pub(super) fn add_products(x: &[Column<u32>], weights: &[u32], sums: &mut [Colum
 }
 
 /// Adds products as [`add_products`] does, on any machine.
-fn add_products_portably(x: &[Column<u32>], weights: &[u32], sums: &mut [Column<i32>]) {
+pub fn add_products_portably(x: &[Column<u32>], weights: &[u32], sums: &mut [Column<i32>]) {
     let halves = |pair: u32| [i32::from(pair as i16), i32::from((pair >> 16) as i16)];
     let rows = rows(weights, sums.len(), x.len());
     for (sum, row) in sums.iter_mut().zip(rows) {
@@ -53,8 +53,9 @@ fn rows(weights: &[u32], count: usize, pairs: usize) -> impl Iterator<Item = &[u
     weights.chunks_exact(length).map(move |row| &row[length - pairs..])
 }
 
+/// Products by the vector instructions of x86-64, each function for machines that have them.
 #[cfg(target_arch = "x86_64")]
-mod x86 {
+pub mod x86 {
     use std::arch::x86_64::{
         __m256i, __m512i, _mm256_add_epi32, _mm256_madd_epi16, _mm256_set1_epi32, _mm512_add_epi32,
         _mm512_madd_epi16, _mm512_set1_epi32,
@@ -69,6 +70,10 @@ mod x86 {
     /// not inlined where functions have instructions of their own.
     macro_rules! add_products {
         ($name:ident, $to_few:ident, $features:literal, $vector:ty, $splat:ident, $multiply:ident, $add:ident) => {
+            /// Adds products as [`add_products`](super::add_products) does.
+            ///
+            /// # Safety
+            /// The machine has these vectors.
             #[target_feature(enable = $features)]
             pub fn $name(x: &[Column<u32>], weights: &[u32], sums: &mut [Column<i32>]) {
                 let mut rows = rows(weights, sums.len(), x.len());
@@ -145,53 +150,4 @@ mod x86 {
         _mm256_madd_epi16,
         _mm256_add_epi32
     );
-}
-
-#[cfg(test)]
-mod tests {
-    use taxel_data::Stream;
-    use taxel_data::random::{Purpose, Random};
-
-    use super::*;
-
-    fn check(add: impl Fn(&[Column<u32>], &[u32], &mut [Column<i32>])) {
-        let mut random = Random::new(1, Stream::Test, Purpose::Noise, 0, 0);
-        let mut word = || (random.unit() * 4_294_967_296.0) as u32;
-        for (pairs, before, sums) in [(1, 0, 1), (9, 1, 16), (8, 0, 18), (5, 3, 7), (72, 1, 33)] {
-            let x: Vec<_> = (0..pairs).map(|_| Column([(); LANES].map(|()| word()))).collect();
-            let weights: Vec<u32> = (0..(before + pairs) * sums).map(|_| word()).collect();
-            let starts: Vec<_> =
-                (0..sums).map(|_| Column([(); LANES].map(|()| word().cast_signed()))).collect();
-            let mut found = starts.clone();
-            add(&x, &weights, &mut found);
-            for (sum, (found, start)) in found.iter().zip(&starts).enumerate() {
-                let row = &weights[sum * (before + pairs) + before..][..pairs];
-                for lane in 0..LANES {
-                    let product = |(x, weight): (&Column<u32>, &u32)| {
-                        let x = x.0[lane];
-                        let low = i64::from(x as i16) * i64::from(*weight as i16);
-                        low + i64::from((x >> 16) as i16) * i64::from((weight >> 16) as i16)
-                    };
-                    let all: i64 = x.iter().zip(row).map(product).sum();
-                    assert_eq!(found.0[lane], (i64::from(start.0[lane]) + all) as i32);
-                }
-            }
-        }
-    }
-
-    #[test]
-    fn products_are_added_modulo_two_to_the_32_with_any_vectors() {
-        check(add_products);
-        check(add_products_portably);
-        #[cfg(target_arch = "x86_64")]
-        if std::is_x86_feature_detected!("avx2") {
-            // SAFETY: this machine has AVX2.
-            check(|x, weights, sums| unsafe { x86::with_avx2(x, weights, sums) });
-        }
-        #[cfg(target_arch = "x86_64")]
-        if std::is_x86_feature_detected!("avx512bw") {
-            // SAFETY: this machine has this part of AVX-512.
-            check(|x, weights, sums| unsafe { x86::with_avx512(x, weights, sums) });
-        }
-    }
 }

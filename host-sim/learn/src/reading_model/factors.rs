@@ -27,7 +27,7 @@ const FRAMES_AT_ONCE: usize = 1024;
 #[derive(Debug, Clone, PartialEq)]
 pub struct Factors {
     sizes: Sizes,
-    pub block: Vec<f32>,
+    pub(super) block: Vec<f32>,
 }
 
 impl Factors {

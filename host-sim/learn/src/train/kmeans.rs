@@ -194,6 +194,3 @@ fn by_distance(pieces: &[Piece]) -> Vec<usize> {
     order.sort_by(|a, b| distances[*a].total_cmp(&distances[*b]));
     order
 }
-
-#[cfg(test)]
-mod tests;

@@ -16,7 +16,8 @@ mod triangle;
 pub(crate) use exp::exponentiate_non_positive;
 pub(crate) use gaussian::squared_distances;
 pub use gaussian::{Gaussians, Regressors};
-use triangle::{NewRows, ROWS_AT_ONCE, Triangle};
+pub use triangle::ROWS_AT_ONCE;
+use triangle::{NewRows, Triangle};
 
 /// Regressors of a set of samples: the rows of the matrix that weights are fitted through.
 pub trait Design: Sync {
@@ -210,6 +211,3 @@ fn decompose(
     }
     triangle
 }
-
-#[cfg(test)]
-mod tests;

@@ -134,7 +134,7 @@ pub fn features(projection: Projection<'_>, readings: &[f64]) -> Vec<f64> {
 
 /// Frames of `dataset` with what the projection has to tell for outputs: the outputs, and where these are fewer than
 /// `features`, their products of two or three factors. Then all are about their means and have a standard deviation of 1.
-pub(super) fn with_targets(dataset: &Dataset, features: usize) -> Cow<'_, Dataset> {
+pub fn with_targets(dataset: &Dataset, features: usize) -> Cow<'_, Dataset> {
     let all = factors(&dataset.outputs, features);
     if all.len() == dataset.outputs.names.len() {
         return Cow::Borrowed(dataset);
@@ -332,6 +332,3 @@ pub(crate) fn add_products(z: &[f64], inputs: usize, sums: &mut [f64]) {
         sums[i..].iter_mut().zip(&z[i..]).for_each(|(sum, z)| *sum += factor * z);
     }
 }
-
-#[cfg(test)]
-mod tests;

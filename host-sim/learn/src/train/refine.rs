@@ -16,12 +16,12 @@ use super::{Options, memory};
 use crate::error::Result;
 
 mod products;
-mod movable;
-mod loss;
-mod adam;
+pub mod movable;
+pub mod loss;
+pub mod adam;
 mod turn;
 mod targets;
-mod width;
+pub mod width;
 mod sources;
 mod descent;
 mod folds;
@@ -210,6 +210,3 @@ fn parts(dataset: &Dataset, fold_of: &[usize]) -> Vec<Dataset> {
     parts.sort_by_key(Dataset::frames);
     parts
 }
-
-#[cfg(test)]
-mod tests;

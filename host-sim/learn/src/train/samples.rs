@@ -107,7 +107,7 @@ impl CentredScale {
 
 /// Penalties on the squared weights of a network, by the number of frames that it is fitted to.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Ridge {
+pub struct Ridge {
     options: Options,
     /// Number of inputs.
     inputs: usize,
@@ -128,9 +128,9 @@ impl Ridge {
     /// inputs in the affine tail, and of 1. A recursion has one for all.
     ///
     /// Where none is chosen and frames are few, the affine tail is fitted as if every reading had an error of a
-    /// [thousandth of its range](LEAST_ERROR). Readings of neighbouring wires hardly differ in some directions; a few
-    /// frames without noise are fitted best by large weights there, which ruin all others. With many frames, or noise,
-    /// it makes no difference.
+    /// thousandth of its range. Readings of neighbouring wires hardly differ in some directions; a few frames without
+    /// noise are fitted best by large weights there, which ruin all others. With many frames, or noise, it makes no
+    /// difference.
     pub fn root(&self, frames: usize, regressor: usize, regressors: usize) -> f64 {
         let root = 1.0 / self.initial_covariance(frames).sqrt();
         let last = regressors - 1;

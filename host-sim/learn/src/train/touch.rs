@@ -23,7 +23,7 @@ mod features;
 mod penalty;
 
 pub(super) use features::{Places, projection as fit_projection};
-pub(super) use penalty::best as best_penalty;
+pub use penalty::best as best_penalty;
 
 /// Frames that a thread takes at a time.
 const FRAMES_AT_ONCE: usize = 256;

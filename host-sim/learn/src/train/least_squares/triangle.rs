@@ -22,7 +22,7 @@ const LANES: usize = 8;
 /// Columns in a panel, whose reflections are applied to the rest at once.
 const PANEL: usize = 24;
 /// Rows that are annihilated at once: U, and a tile beside it, stay in the first cache.
-pub(super) const ROWS_AT_ONCE: usize = 144;
+pub const ROWS_AT_ONCE: usize = 144;
 /// Rows for which a product is computed at a time: 6 × 8 sums fill the vector registers.
 const STRIP: usize = 6;
 /// Sum of squares below which a column holds nothing but underflow.

@@ -13,9 +13,11 @@ use crate::parallel;
 
 /// Mean squared error of each task's samples, summed over tasks, and its gradient by what moves.
 #[derive(Debug, Clone)]
-pub(super) struct Loss {
-    pub(super) value: f64,
-    pub(super) gradient: Vec<f64>,
+pub struct Loss {
+    /// Sum over tasks of the mean squared error.
+    pub value: f64,
+    /// Derivative of the value by each of [`Movable::values`].
+    pub gradient: Vec<f64>,
 }
 
 /// Output weights solved on a set of samples, and what a gradient through them needs.
@@ -139,7 +141,10 @@ impl Weighing {
 /// Mean squared error of `tasks` on `pieces` with the weights solved on the same samples; none without samples.
 ///
 /// By the weights the derivative is 0, but for the penalty's small part, so they count as constants.
-pub(super) fn on_same(
+///
+/// # Errors
+/// [`Error`](crate::Error) for samples without a regression.
+pub fn on_same(
     movable: &Movable,
     tasks: &[Vec<usize>],
     pieces: &[&Piece],
@@ -162,7 +167,10 @@ pub(super) fn on_same(
 ///
 /// With A and Y the regressors and targets of the rest, W = G⁻¹AᵀY with G = AᵀA + penalty, V the derivative of
 /// the loss by W, and Z = G⁻¹V, the derivative by A is (Y − AW)·Zᵀ − A·Z·Wᵀ.
-pub(super) fn on_held_out(
+///
+/// # Errors
+/// [`Error`](crate::Error) for samples without a regression.
+pub fn on_held_out(
     movable: &Movable,
     tasks: &[Vec<usize>],
     rest: &[&Piece],
@@ -205,7 +213,10 @@ pub(super) fn on_held_out(
 
 /// Squared errors of the samples of each task in the pieces `held_out`, with the weights solved on the `rest`: none of a
 /// task without samples there.
-pub(super) fn held_out_errors(
+///
+/// # Errors
+/// [`Error`](crate::Error) for samples without a regression.
+pub fn held_out_errors(
     movable: &Movable,
     tasks: &[Vec<usize>],
     rest: &[&Piece],

@@ -11,13 +11,15 @@ const AT_ONCE: usize = 8;
 
 /// Sizes of a network that is refined.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Sizes {
+pub struct Sizes {
     /// Number of inputs that the network sees.
-    pub(super) inputs: usize,
-    pub(super) centres: usize,
+    pub inputs: usize,
+    /// Number of centres.
+    pub centres: usize,
     /// Number of numbers that the inputs are mixed of; 0 if the network sees samples as they are.
-    pub(super) sources: usize,
-    pub(super) affine_tail: bool,
+    pub sources: usize,
+    /// Whether the inputs are regressors too.
+    pub affine_tail: bool,
 }
 
 impl Sizes {
@@ -29,14 +31,15 @@ impl Sizes {
 
 /// Centres (`centres × inputs`), the logarithm of their width, and the mix (`sources × inputs`) if there is one.
 #[derive(Debug, Clone)]
-pub(super) struct Movable {
+pub struct Movable {
     pub(super) sizes: Sizes,
-    pub(super) values: Vec<f64>,
+    /// All numbers, one after the other.
+    pub values: Vec<f64>,
 }
 
 impl Movable {
     /// Start of a network with these `centres`, their `width`, and the mix (empty for none).
-    pub(super) fn new(sizes: Sizes, centres: &[f64], width: f64, mix: &[f64]) -> Self {
+    pub fn new(sizes: Sizes, centres: &[f64], width: f64, mix: &[f64]) -> Self {
         Self { sizes, values: [centres, &[libm::log(width)], mix].concat() }
     }
 
@@ -174,7 +177,7 @@ fn exponents_of(inputs: &[Line], centre: &[f64], decay: f64) -> Line {
 
 /// Samples side by side; lines beyond the last sample are 0.
 #[derive(Debug, Clone)]
-pub(super) struct Piece {
+pub struct Piece {
     /// Scaled inputs, a line each.
     pub(super) inputs: Vec<Line>,
     /// What the outputs should be times the weight, a line each; NaN where one is missing.
@@ -187,7 +190,7 @@ pub(super) struct Piece {
 
 impl Piece {
     /// Lays samples side by side: `inputs` (`samples × width`) with their `targets` (`samples × outputs`) and `weights`.
-    pub(super) fn all(
+    pub fn all(
         (inputs, width): (&[f64], usize),
         (targets, outputs): (&[f64], usize),
         weights: &[f64],

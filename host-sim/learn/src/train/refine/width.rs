@@ -14,9 +14,9 @@ const LARGEST_EXPONENT: f64 = 64.0;
 /// Least width σ with which fixed16 holds Gaussians at `centres` (`centres × inputs`).
 ///
 /// Inputs are clamped to a box about the middle of their training `ranges`, which all have the widest one's span
-/// and the clamp's margin. In a corner of it log₂e·‖x − c‖²/2σ² must not pass [`LARGEST_EXPONENT`]. With few
-/// inputs that is near, and the format then ends where its decay no longer fits 32 bits.
-pub(super) fn least(centres: &[f64], ranges: &[[f64; 2]]) -> f64 {
+/// and the clamp's margin. In a corner of it log₂e·‖x − c‖²/2σ² must not pass 64. With few inputs that is near, and the
+/// format then ends where its decay no longer fits 32 bits.
+pub fn least(centres: &[f64], ranges: &[[f64; 2]]) -> f64 {
     let span = ranges.iter().map(|[low, high]| high - low).fold(0.0, f64::max);
     let half = f64::from(HALF_RANGE) * span;
     let reach = |centre: &[f64]| -> f64 {

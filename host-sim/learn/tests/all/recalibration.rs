@@ -1,13 +1,13 @@
+//! Recalibration of models whose readings have drifted, by presses.
+
 use taxel_core::rbf::Format;
-use taxel_data::{AtRest, Dataset, Purpose, Random, Silent, Stream};
+use taxel_data::{AtRest, Dataset, Purpose, Random, Silent, Stream, Table};
+use taxel_learn::reading_model::{self, Extent, HeldOut, Statistics};
+use taxel_learn::recalibration::{is_untouched, recalibrate, training_errors};
+use taxel_learn::train::{Features, Kinds, train};
+use taxel_learn::{ModelBlob, Options, Origin, PreparedModel, pack, relative};
 use taxel_simulate::outputs::{ContactOutput, Outputs};
 use taxel_simulate::{Synthesis, World, synthesise};
-
-use super::*;
-use crate::reading_model::{self, Extent, HeldOut, Statistics};
-use crate::train::touch::{Features, Kinds};
-use crate::train::train;
-use crate::{Options, Origin, pack, relative};
 
 /// `readings` times a factor of each channel.
 fn drifted(readings: &Table, gains: &[f64]) -> Table {
@@ -15,6 +15,10 @@ fn drifted(readings: &Table, gains: &[f64]) -> Table {
     let values = readings.values.iter_mut().zip(gains.iter().cycle());
     values.for_each(|(reading, gain)| *reading *= gain);
     readings
+}
+
+fn mean(values: &[f64]) -> f64 {
+    values.iter().sum::<f64>() / values.len() as f64
 }
 
 /// A world's frames, and gains from ±10 % that its readings drift to.

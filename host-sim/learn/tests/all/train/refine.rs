@@ -1,15 +1,20 @@
+//! Refined training: its loss, its descent, and what it gains.
+
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use taxel_core::rbf::Format;
-use taxel_data::{Purpose, Random, Silent, Stream};
+use taxel_data::{Dataset, Progress, Purpose, Random, Silent, Stream};
+use taxel_learn::infer::infer;
+use taxel_learn::train::refine::adam::Adam;
+use taxel_learn::train::refine::loss::{Loss, held_out_errors, on_held_out, on_same};
+use taxel_learn::train::refine::movable::{Movable, Piece, Sizes};
+use taxel_learn::train::refine::{refine, width};
+use taxel_learn::train::{
+    Examples, Found, FreshFrames, Options, Refinement, Samples, Start, Trained, train,
+    train_refined,
+};
+use taxel_learn::{Origin, pack};
 use taxel_simulate::{Synthesis, World};
-
-use super::loss::{Loss, held_out_errors, on_held_out, on_same};
-use super::movable::{Movable, Piece, Sizes};
-use super::*;
-use crate::infer::infer;
-use crate::train::trained::fit;
-use crate::train::{Start, train, train_refined};
 
 fn draws(purpose: u64) -> impl FnMut() -> f64 {
     let mut random = Random::new(11, Stream::Test, Purpose::Damage, purpose, 0);
@@ -167,8 +172,8 @@ fn quick() -> Refinement {
 }
 
 /// Root mean square of the errors in z of a model of one network on `test`.
-fn rmse(trained: &crate::train::Trained, test: &Dataset) -> f64 {
-    let blob = crate::pack(trained, test, &crate::Origin::of_data("", 0, 1, test)).unwrap();
+fn rmse(trained: &Trained, test: &Dataset) -> f64 {
+    let blob = pack(trained, test, &Origin::of_data("", 0, 1, test)).unwrap();
     let estimate = blob.prepare().decode_lines(&test.inputs.values);
     let squares: f64 = test.outputs.squared_errors(&estimate).iter().skip(2).step_by(3).sum();
     (3.0 * squares / estimate.len() as f64).sqrt()
@@ -230,12 +235,11 @@ fn refinement_on_folds_helps_many_frames_and_does_not_harm_few() {
         let fold_of: Vec<usize> = (0..frames).map(|frame| frame % 4).collect();
         let examples = Examples::Folds(&fold_of);
         let taken = Taken(AtomicUsize::new(0));
-        let start = Start::all(&training, &options).unwrap().remove(0);
-        let layers = start.layers(&options);
-        let layers = refine(&start.frames, &layers, &options, &quick(), examples, &taken).unwrap();
-        let penalty = start.penalty(&layers, &options, Some(&quick())).unwrap();
-        let networks = fit(&layers, &options, &[penalty], &Silent).remove(0).unwrap();
-        let refined = crate::train::Trained { fronts: vec![], networks };
+        let starts = Start::all(&training, &options).unwrap();
+        let layers = starts.iter().map(|start| start.layers(&options)).collect();
+        let refinement = Some((&quick(), examples));
+        let found = Found::new(&starts, layers, &options, &[None], refinement, &taken).unwrap();
+        let refined = found.fit(options.format, false, &Silent).remove(0).unwrap();
         let start = train(&training, &options, &Silent).unwrap();
         let ratio = rmse(&refined, &test) / rmse(&start, &test);
         assert!(ratio < most, "{noise}: {ratio}");
@@ -254,14 +258,10 @@ fn the_least_width_of_few_inputs_is_just_held_by_fixed16() {
     data.inputs.values.fill_with(&mut draw);
     data.outputs.values.fill_with(&mut draw);
     let options = Options { centres: 12, format: Format::Fixed16, ..Options::of_rows() };
-    let start = Start::all(&data, &options).unwrap().remove(0);
-    let start = start.layers(&options);
-    let least = width::least(&start.hidden[0].centres, &[[0.0, 1.0]; 2]);
-    let held = |spread: f64| {
-        let mut layers = start.clone();
-        layers.hidden[0].spread = spread;
-        fit(&layers, &options, &[None], &Silent)[0].is_ok()
-    };
+    let samples = Samples::new(&data);
+    let centres = samples.centres(&options, 0);
+    let least = width::least(&centres, &[[0.0, 1.0]; 2]);
+    let held = |spread: f64| samples.fit(&centres, &Options { spread, ..options }).is_ok();
     assert!(held(least) && !held(0.999 * least), "{least}");
 }
 
@@ -303,12 +303,25 @@ fn refinement_leaves_narrow_gaussians_narrow() {
         let examples = Examples::Folds(&fold_of);
         let refined = train_refined(&data, &options, Some((&quick(), examples)), &Silent).unwrap();
         let start = train(&data, &options, &Silent).unwrap();
-        let error = |trained: &crate::train::Trained| {
+        let error = |trained: &Trained| {
             let network = trained.networks[0].network();
             let estimate = infer(&network, &data.inputs.values);
             (data.outputs.squared_errors(&estimate)[0] / x.len() as f64).sqrt()
         };
         let (before, after) = (error(&start), error(&refined));
         assert!(after < 1.1 * before, "{constants} constants: {before} -> {after}");
+    }
+}
+
+#[test]
+fn the_rate_falls_along_half_a_cosine() {
+    let (mut adam, mut values) = (Adam::new(0.1, 4, 1), [0.0]);
+    let moved = [0, 1, 2, 3].map(|_| {
+        let before = values[0];
+        adam.descend(&mut values, &[1.0]);
+        before - values[0]
+    });
+    for (moved, share) in moved.iter().zip([1.0, 0.853_553, 0.5, 0.146_447]) {
+        assert!((moved - 0.1 * share).abs() < 1e-6, "{moved} {share}");
     }
 }

@@ -1,12 +1,14 @@
+//! Faults of wires, told from frames.
+
 use std::ops::Range;
 
-use taxel_data::{Purpose, Random, Stream};
+use taxel_core::health::Limits;
+use taxel_data::{Purpose, Random, Stream, Table};
+use taxel_learn::faults::{Found, Grid, Kind, Place, WINDOW, WireFault, diagnose, windows};
+use taxel_learn::reading_model::factors::Factors;
 use taxel_simulate::path::Path;
 use taxel_simulate::timetable::Timetable;
 use taxel_simulate::{Synthesis, World, synthesise};
-
-use super::*;
-use crate::reading_model::factors::Factors;
 
 /// Readings of a whole sensor, and factors fitted to other ones.
 fn sensor() -> (Table, Factors) {
@@ -182,4 +184,13 @@ fn columns_without_wires_have_no_faults() {
     assert!(diagnose(&table, Limits::USUAL, None).is_empty());
     let names = ["r1c1_ohm", "r1c2_ohm", "r2c1_ohm"].map(String::from);
     assert_eq!(Grid::new(&names), None);
+}
+
+#[test]
+fn a_row_and_a_column_at_once_are_both_told_and_nothing_else() {
+    let names = (1..=3).flat_map(|m| (4..=7).map(move |k| format!("r{m}c{k}_ohm")));
+    let grid = Grid::new(&names.collect::<Vec<_>>()).unwrap();
+    let cross = [2, 4, 5, 6, 7, 10];
+    assert_eq!(grid.wires_of(&cross), [Place::Row(2), Place::Column(6)]);
+    assert_eq!(grid.wires_of(&cross[1..]), [Place::Row(2), Place::Reading(3, 6)]);
 }

@@ -1,4 +1,7 @@
-use super::*;
+//! Recursive least squares.
+
+use taxel_learn::rls::{LARGEST, Rls};
+use taxel_learn::train::least_squares::Factor;
 
 #[test]
 fn the_largest_usable_numbers_give_finite_weights() {
@@ -53,7 +56,7 @@ fn hopeless_settings_are_refused() {
 
 #[test]
 fn a_direction_without_any_knowledge_gets_weight_0() {
-    let mut weights = [f64::NAN; 2];
-    solve(&[3.0, 1.0, 0.0, 0.0], &[6.0, 0.0], 2, &mut weights);
-    assert_eq!(weights, [2.0, 0.0]);
+    let (root, projection) = (vec![3.0, 1.0, 0.0, 0.0], vec![6.0, 0.0]);
+    let factor = Factor { root, projection, regressors: 2, outputs: 1 };
+    assert_eq!(factor.weights(), [2.0, 0.0]);
 }

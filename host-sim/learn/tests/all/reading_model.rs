@@ -1,12 +1,15 @@
+//! Reading models: what they fill, deviations and novelty.
+
+mod mixture;
+
 use std::sync::OnceLock;
 
 use taxel_core::Decoder;
-use taxel_data::{Purpose, Random, Silent, Stream};
+use taxel_data::{Dataset, Purpose, Random, Silent, Stream, Table};
+use taxel_learn::reading_model::{Extent, HeldOut, Statistics, add, check, quantile};
+use taxel_learn::train::train;
+use taxel_learn::{ModelBlob, Options, Origin, Result, pack, relative};
 use taxel_simulate::{World, synthesise};
-
-use super::*;
-use crate::packing::{Origin, pack};
-use crate::train::{Options, train};
 
 /// The model of `blob` with a reading model.
 fn fitted(world: &World, training: &Dataset, blob: &ModelBlob) -> ModelBlob {
@@ -139,9 +142,9 @@ fn novelty_holds_where_factors_leave_nothing_but_rounding() {
 
 #[test]
 fn a_quantile_of_few_values_covers_its_share() {
-    let of = |share| super::quantile(&mut [3.0, 1.0, 2.0], share);
+    let of = |share| quantile(&mut [3.0, 1.0, 2.0], share);
     assert_eq!([of(0.1), of(0.34), of(0.5), of(0.67), of(1.0)], [1.0, 2.0, 2.0, 3.0, 3.0]);
-    assert_eq!(super::quantile(&mut [], 0.5), 0.0);
+    assert_eq!(quantile(&mut [], 0.5), 0.0);
 }
 
 #[test]
@@ -226,7 +229,7 @@ fn each_frame_is_filled_relative_to_its_own_baseline() {
     let names = world.reading_names();
     let rest = |values: Vec<f64>| Table { names: names.clone(), values: values.into() };
     let frames = synthesise(&world, Stream::Training, 1500);
-    let frames = crate::relative::dataset(frames, &rest(vec![50.0; 36]));
+    let frames = relative::dataset(frames, &rest(vec![50.0; 36]));
     let options = Options { centres: 8, ..Options::of_rows() };
     let trained = train(&frames, &options, &Silent).unwrap();
     let blob = pack(&trained, &frames, &Origin::of_data("rows", 0, 1, &frames)).unwrap();

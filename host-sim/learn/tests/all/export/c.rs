@@ -1,7 +1,11 @@
-use taxel_core::blob::{Model, ModelParts, encode_to_vec};
-use taxel_core::rbf::Network;
+//! Models as a library in C.
 
-use super::*;
+use taxel_core::blob::{Model, ModelParts, encode_to_vec};
+use taxel_core::health::Limits;
+use taxel_core::rbf::Network;
+use taxel_learn::ModelBlob;
+use taxel_learn::export::c::template::{self, Values};
+use taxel_learn::export::c::{BadName, Name, SourceFile, library, numbers};
 
 const LIMITS: Option<Limits> = Some(Limits::USUAL);
 

@@ -1,7 +1,10 @@
-use taxel_data::{Purpose, Random, Stream};
+//! Decoders behind a filter in time, and the rule for its settings.
 
-use super::*;
-use crate::decoder::{Decoder, Timing};
+use taxel_core::filter::{Settings, State};
+use taxel_core::{Estimate, RowStatus};
+use taxel_data::{Purpose, Random, Stream};
+use taxel_learn::filtered::{Movement, filter_frames, settings_for, time_constant_for};
+use taxel_learn::{Decoder, Estimates, Filtered, FrameDecoder, Frames, Timing};
 
 /// Decoder of a test, whose outputs are the readings.
 struct Same;

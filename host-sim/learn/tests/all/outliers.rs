@@ -1,6 +1,7 @@
-use taxel_data::{Purpose, Random, Stream};
+//! Lines of measurements with a value far from all others.
 
-use super::*;
+use taxel_data::{Dataset, Purpose, Random, Stream};
+use taxel_learn::outliers::{Outliers, find};
 
 /// Readings of six channels and two outputs that follow them, in so many lines.
 fn measured(lines: usize, seed: u64) -> Dataset {
@@ -178,7 +179,11 @@ fn wild_values_do_not_hide_each_other() {
 #[test]
 fn values_that_spread_as_far_as_their_gap_are_no_outliers() {
     let bulk = || (0..1000).map(|i| f64::from(i) / 1000.0);
-    let far = |values: [f64; 2]| far_above(&bulk().chain(values).collect::<Vec<_>>(), 0.0);
+    let far = |values: [f64; 2]| {
+        let mut data = Dataset::empty(vec!["ch1".into()], vec![], 1, 0);
+        data.inputs.values.extend(bulk().chain(values));
+        outliers(&data).lines
+    };
     assert_eq!(far([6.0, 6.5]), 2);
     assert_eq!(far([6.0, 12.0]), 0, "honest touches reach any depth");
     assert_eq!(far([40.0, 90.0]), 2, "too far for that");

@@ -1,11 +1,15 @@
-use taxel_data::{Purpose, Random, Silent, Stream};
-use taxel_simulate::{World, synthesise};
+//! Projection of readings to features.
 
-use super::*;
-use crate::decoders::RowDecoder;
-use crate::decoders::linear::LinearRow;
-use crate::train::touch::seen;
-use crate::train::{Features, Kinds, Options, train};
+use taxel_core::projection::Projection;
+use taxel_data::{Dataset, Purpose, Random, Silent, Stream, Table};
+use taxel_learn::decoders::RowDecoder;
+use taxel_learn::decoders::linear::LinearRow;
+use taxel_learn::train::projection::{
+    USUAL_FEATURES, features, features_at_most, fit, view, with_targets,
+};
+use taxel_learn::train::touch::seen;
+use taxel_learn::train::{Features, Kinds, Options, train};
+use taxel_simulate::{World, synthesise};
 
 /// Data set of readings r1…r6 in two rows of three; the outputs are known sums of them.
 fn known(frames: usize, noise: f64) -> Dataset {
@@ -36,11 +40,10 @@ fn features_carry_all_that_outputs_take_from_readings() {
     // Two sums decide all outputs: two features follow them to the noise, and the third is noise.
     let spans: Vec<f64> = seen.inputs.ranges().iter().map(|[low, high]| high - low).collect();
     assert!(spans[0] > 1.0 && spans[1] > 1.0 && spans[2] < 0.02, "{spans:?}");
-    let of = |table: &Table| DMatrix::from_row_slice(table.len(), table.names.len(), &table.values);
-    let (mut x, y) = (of(&seen.inputs).columns(0, 2).into_owned(), of(&data.outputs));
-    x = x.insert_column(2, 1.0);
-    let fitted = (x.tr_mul(&x)).cholesky().unwrap().solve(&x.tr_mul(&y));
-    let worst = (&x * fitted - y).amax();
+    let two = Dataset { inputs: seen.inputs.columns(0, 2), ..seen };
+    let linear = LinearRow::fit(&two, &(0..400).collect::<Vec<_>>());
+    let pairs = linear.predict(&two.inputs.values).into_iter().zip(data.outputs.values.iter());
+    let worst = pairs.map(|(found, y)| (found - y).abs()).fold(0.0, f64::max);
     assert!(worst < 0.02, "{worst}");
     // The reading that never changes has no part.
     let parts = &parameters[3..];
@@ -70,7 +73,7 @@ fn few_outputs_are_told_by_features_of_their_products() {
     assert!(spans.iter().all(|span| *span > 0.0), "{spans:?}");
     // One output has three powers, and there are no more features than that.
     let depth = Dataset { outputs: data.outputs.columns(2, 1), ..data.clone() };
-    assert_eq!(fit(&depth, None).unwrap().len(), MOST_FACTORS * 145);
+    assert_eq!(fit(&depth, None).unwrap().len(), 3 * 145);
     assert_eq!(fit(&data, Some(5)).unwrap().len(), 5 * 145);
     // A number that a user asks for is given or refused.
     for (data, outputs, most) in [(&data, 4, 34), (&depth, 1, 3)] {
@@ -93,10 +96,13 @@ fn outputs_that_are_never_together_have_no_products() {
     for (number, line) in data.outputs.values.chunks_exact_mut(2).enumerate() {
         line[number % 2] = f64::NAN;
     }
-    assert_eq!(
-        factors(&data.outputs, 9),
-        [&[0][..], &[1], &[0, 0], &[1, 1], &[0, 0, 0], &[1, 1, 1]]
-    );
+    let targets = &with_targets(&data, 9).outputs;
+    // a, b, aa, bb, aaa, bbb.
+    assert_eq!(targets.names.len(), 6);
+    for (number, line) in targets.lines().enumerate() {
+        let missing = (0..6).filter(|target| line[*target].is_nan());
+        assert!(missing.eq([0, 2, 4].map(|power| power + number % 2)), "{number}: {line:?}");
+    }
     assert_eq!(fit(&data, Some(5)).unwrap().len(), 5 * 7);
 }
 

@@ -1,10 +1,22 @@
-use taxel_data::{AtRest, Dataset, Purpose, Random, Silent, Stream, Table};
+//! Training of networks.
 
-use super::*;
-use crate::decoders::RowDecoder;
-use crate::decoders::linear::LinearRow;
-use crate::decoders::standard::StandardNetwork;
-use crate::infer::infer;
+mod kmeans;
+mod least_squares;
+mod penalty;
+mod projection;
+mod refine;
+mod resolution;
+
+use taxel_core::rbf::Format;
+use taxel_data::{AtRest, Dataset, Purpose, Random, Silent, Stream, Table};
+use taxel_learn::decoders::RowDecoder;
+use taxel_learn::decoders::linear::LinearRow;
+use taxel_learn::decoders::standard::StandardNetwork;
+use taxel_learn::infer::infer;
+use taxel_learn::train::memory::peak_bytes;
+use taxel_learn::train::{
+    Found, INITIAL_COVARIANCE, MOST_MEMORY_BYTES, Options, Ridge, Samples, Solver, Start, train,
+};
 
 /// Table of `frames` of a smooth function of two inputs, with a little noise.
 fn table(frames: usize, noise: f64) -> Dataset {
@@ -41,20 +53,18 @@ fn the_standard_network_interpolates_its_samples_exactly() {
 #[test]
 fn penalties_fitted_together_give_the_networks_of_each_alone() {
     let table = table(3000, 0.05);
-    let samples = Samples::new(&table);
     let penalties = [None, Some(1e-9), Some(1e-5), Some(1e-2)];
     for format in Format::ALL {
         let options = Options { centres: 12, spread: 0.4, format, ..Options::of_rows() };
-        let centres = samples.centres(&options, 0);
-        let layer = samples.layer(centres.clone(), &options);
-        let together: Vec<FittedNetwork> = samples
-            .fit_each(&layer, &options, &penalties)
-            .into_iter()
-            .map(Result::unwrap)
-            .collect();
-        for (penalty, fitted) in penalties.iter().zip(&together) {
-            let options = Options { penalty: *penalty, ..options };
-            assert_eq!(*fitted, samples.fit(&centres, &options).unwrap(), "{format:?} {penalty:?}");
+        let starts = Start::all(&table, &options).unwrap();
+        let layers = starts.iter().map(|start| start.layers(&options)).collect();
+        let found = Found::new(&starts, layers, &options, &penalties, None, &Silent).unwrap();
+        let together: Vec<_> =
+            found.fit(format, false, &Silent).into_iter().map(|it| it.unwrap().networks).collect();
+        assert_eq!(together.len(), penalties.len());
+        for (penalty, networks) in penalties.iter().zip(&together) {
+            let alone = train(&table, &Options { penalty: *penalty, ..options }, &Silent).unwrap();
+            assert_eq!(*networks, alone.networks, "{format:?} {penalty:?}");
         }
         assert_ne!(together[0], together[3]);
     }
@@ -93,8 +103,8 @@ fn training_beyond_the_memory_bound_is_refused_in_advance() {
     // Refinement holds the square of all weights for every piece of the samples.
     let narrow = Dataset::empty(names(10), vec!["y".into()], 1, 50_000);
     let many = Options { centres: 4000, ..options };
-    assert!(super::memory::check(&narrow, &many, None).is_ok());
-    assert!(super::memory::check(&narrow, &many, Some(250)).is_err());
+    let bytes = [None, Some(250)].map(|pieces| peak_bytes(&narrow, &many, pieces));
+    assert!(bytes[0] <= MOST_MEMORY_BYTES && bytes[1] > MOST_MEMORY_BYTES, "{bytes:?}");
 }
 
 /// The usual table, whose first output is missing wherever the second one is below −0.3. The input's range is that of the
@@ -123,7 +133,7 @@ fn alone(table: &Dataset, column: usize) -> Dataset {
 #[test]
 fn each_output_has_the_network_that_its_own_lines_give_alone() {
     let table = with_missing_outputs(3000);
-    let samples = Samples::new(&table);
+    let (samples, inputs) = (Samples::new(&table), &table.inputs);
     let mut solvers = vec![(Format::F32, Solver::Rls)];
     solvers.extend(Format::ALL.map(|it| (it, Solver::Qr)));
     for (format, solver) in solvers {
@@ -133,7 +143,7 @@ fn each_output_has_the_network_that_its_own_lines_give_alone() {
             let options = Options { penalty, ..usual };
             let predicted = |table: &Dataset| {
                 let fitted = Samples::new(table).fit(&centres, &options).unwrap();
-                (fitted.format(), infer(&fitted.network(), &samples.table.inputs.values))
+                (fitted.format(), infer(&fitted.network(), &inputs.values))
             };
             let (format, together) = predicted(&table);
             for column in 0..2 {
