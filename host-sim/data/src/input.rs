@@ -15,7 +15,7 @@ use crate::error::{Error, Problem, Result};
 pub const MOST_DATA_BYTES: u64 = 2_000_000_000;
 /// Most bytes that are read of what is no file and may have no end, such as a device or a pipe: 256 MB.
 pub const MOST_STREAM_BYTES: u64 = 256_000_000;
-/// Most numbers that a data file may hold, and a data set of a scene: 4 GB.
+/// Most numbers that a data set of a scene may hold: 4 GB.
 pub const MOST_VALUES: usize = 500_000_000;
 /// Largest text file with settings in bytes, such as a scene's: 16 MB.
 pub const MOST_TEXT_BYTES: u64 = 16_000_000;
