@@ -1,7 +1,6 @@
 //! Loss of accuracy by number formats: the same centres fitted and evaluated in f64, in f32 and in 16-bit
 //! fixed point, on both reference scenes, by axis. Figures: `TAXEL_CASES=3 cargo test -p taxel-learn --test all number_formats -- --nocapture`.
 
-use rayon::prelude::*;
 use taxel_core::rbf::Format;
 use taxel_data::{Dataset, Stream, Table, columns};
 use taxel_learn::Options;
@@ -67,7 +66,6 @@ fn errors(name: &str, noise: f64) -> [Vec<f64>; 3] {
     let test = synthesise(&world, Stream::Test, 4000);
     let options = Options::of_rows();
     let of_rows: Vec<[Vec<f64>; 3]> = (0..rows().len())
-        .into_par_iter()
         .map(|row| {
             let (training, test) = (training.row_table(row), test.row_table(row));
             let samples = Samples::new(&training);
