@@ -144,22 +144,30 @@ pub fn unrefined(scene: &str) -> Experiment {
     experiment
 }
 
-/// Scene that runs in a moment: rows 4 and 5 of `press`, without refinement; a network for each row in f32.
-pub fn small_scene() -> String {
-    let mut scene = include_str!("../../../scenes/press.toml").to_owned();
-    for (from, to) in [
-        ("name = \"press\"", "name = \"small\""),
-        ("[training]", "[training]\nrefine = false\neach_row = true\nformat = \"f32\""),
-        ("spread = 0.4", "spread = 0.8"),
-        ("[outputs]", "[readout]\nrow_wires = [4, 5]\n\n[outputs]"),
-        ("frames = 20000", "frames = 3000"),
-        ("test_frames = 8000", "test_frames = 80"),
-        ("centres = 64", "centres = 12"),
-    ] {
+/// A scene's text, in which each of the texts is replaced by another.
+fn replaced(scene: &str, texts: &[(&str, &str)]) -> String {
+    let mut scene = scene.to_owned();
+    for (from, to) in texts {
         assert!(scene.contains(from), "{from}");
         scene = scene.replacen(from, to, 1);
     }
     scene
+}
+
+/// Scene that runs in a moment: rows 4 and 5 of `press`, without refinement; a network for each row in f32.
+pub fn small_scene() -> String {
+    replaced(
+        include_str!("../../../scenes/press.toml"),
+        &[
+            ("name = \"press\"", "name = \"small\""),
+            ("[training]", "[training]\nrefine = false\neach_row = true\nformat = \"f32\""),
+            ("spread = 0.4", "spread = 0.8"),
+            ("[outputs]", "[readout]\nrow_wires = [4, 5]\n\n[outputs]"),
+            ("frames = 20000", "frames = 3000"),
+            ("test_frames = 8000", "test_frames = 80"),
+            ("centres = 64", "centres = 12"),
+        ],
+    )
 }
 
 /// [`small_scene`] with as few frames as its least possible error needs.
@@ -167,6 +175,26 @@ pub fn tiny_scene() -> String {
     small_scene()
         .replace("frames = 3000", "frames = 200")
         .replace("test_frames = 80", "test_frames = 50")
+}
+
+/// A quarter of the sensor of `moving`, two trajectories, and few frames.
+pub fn tiny_moving_scene() -> String {
+    replaced(
+        include_str!("../../../scenes/moving.toml"),
+        &[
+            ("row_wires = 8", "row_wires = 4"),
+            ("electrodes_per_row_wire = 6", "electrodes_per_row_wire = 3"),
+            ("column_wires = 18", "column_wires = 9"),
+            ("[20.0, 18.0, 5.0]", "[10.0, 9.0, 5.0]"),
+            ("[[8.0, 12.0], [7.0, 11.0]]", "[[4.0, 6.0], [3.0, 5.0]]"),
+            ("[[0.5, 7.5], [0.5, 6.5]]", "[[0.5, 2.5], [0.5, 2.5]]"),
+            ("trajectories = 64", "trajectories = 2"),
+            ("[training]", "[training]\nrefine = false"),
+            ("frames = 20000", "frames = 400"),
+            ("test_frames = 8000", "test_frames = 60"),
+            ("centres = 64", "centres = 8"),
+        ],
+    )
 }
 
 /// [`small_scene`] with a Table 1, which takes most of its time.

@@ -6,7 +6,7 @@ use std::fs;
 use serde::Deserialize;
 use serde_json::Value;
 
-use crate::common::{Folder, small_scene_with_table1, tiny_scene};
+use crate::common::{Folder, small_scene_with_table1, tiny_moving_scene, tiny_scene};
 
 /// Commands without options of their own here, as they need a device.
 const OTHERS: [&str; 5] = ["emulate", "link", "view", "completions", "help"];
@@ -74,15 +74,13 @@ fn log() -> String {
 
 fn prepared() -> Folder {
     let folder = Folder::new("options");
-    let tiny = tiny_scene();
+    let tiny = tiny_scene().replace("test_frames = 50", "test_frames = 16");
     folder.write("tiny.toml", &tiny);
     let format = "each_row = true\nformat = \"f32\"\n";
     folder.write("array.toml", tiny.replace(format, ""));
     folder.write("table1.toml", small_scene_with_table1());
-    let moving = include_str!("../../../scenes/moving.toml");
-    let short = moving.replace("duration_s = 0.6", "duration_s = 0.1");
-    let few = short.replace("trajectories = 64", "trajectories = 2");
-    folder.write("moving.toml", few.replace("test_frames = 8000", "test_frames = 60"));
+    folder
+        .write("moving.toml", tiny_moving_scene().replace("duration_s = 0.6", "duration_s = 0.1"));
     let log = log();
     let some = |from: usize, count: usize| {
         let lines = log.lines().take(1).chain(log.lines().skip(from).take(count));
