@@ -92,7 +92,7 @@ def bound():
     held_out = list(touches())[RATE_HZ * SECONDS * 4 // 5 :]
     least = [variances(*touch) for touch in held_out if touch[1] > 0]
     force, x, y = (sum(of_frames) / len(least) for of_frames in zip(*least))
-    print(f"bound: {math.sqrt(x):.4f} mm, {math.sqrt(y):.4f} mm, {math.sqrt(force + FORCE_NOISE_N**2):.4f} N")
+    print(f"bound: {math.sqrt(x):.5f} mm, {math.sqrt(y):.5f} mm, {math.sqrt(force + FORCE_NOISE_N**2):.5f} N")
 
 
 if __name__ == "__main__":
