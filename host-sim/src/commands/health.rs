@@ -193,9 +193,9 @@ impl HealthArguments {
     }
 }
 
-/// Notes on stderr which wires of a device are open or shorted, by the `readings` that it scanned.
-pub fn note_faults(readings: &Table, common: &Common) {
-    let faults = diagnose(readings, Limits::USUAL, None);
+/// Notes on stderr which wires of a device are open or shorted, by the `readings` that it scanned and its `limits`.
+pub fn note_faults(readings: &Table, limits: Limits, common: &Common) {
+    let faults = diagnose(readings, limits, None);
     notes(&[], &faults, readings.len()).iter().for_each(|it| common.remark(it));
 }
 

@@ -26,15 +26,15 @@ pub struct FrameByFrame<'b> {
 }
 
 impl<'b> FrameByFrame<'b> {
-    /// Decoder by the model in `blob`.
+    /// Decoder by the model in `blob`, of readings with these `limits` if they are in Ω.
     ///
     /// # Errors
     /// Never, for a blob that was checked.
-    pub fn new(blob: &'b ModelBlob) -> Result<Self> {
+    pub fn new(blob: &'b ModelBlob, limits: Limits) -> Result<Self> {
         let decoder =
             Decoder::new(blob.parse()).map_err(|cause| Error::failed(cause.to_string()))?;
         let metadata = decoder.metadata();
-        let limits = sheet::limits(metadata.input_names.iter());
+        let limits = sheet::limits(metadata.input_names.iter(), limits);
         let readings = metadata.input_names.iter().count();
         let reciprocals = metadata.relative_inputs.then(|| vec![f32::NAN; readings]);
         let scratch = vec![0.0; decoder.scratch_floats()];
@@ -145,7 +145,7 @@ mod tests {
             Synthesis::new(&scene.world).untouched().ideal().frames(Stream::Test, 1).inputs;
         let model = blob.prepare().with_baseline(&baseline.values);
         let floats = |line: &[f64]| line.iter().map(|it| *it as f32).collect::<Vec<f32>>();
-        let mut decoder = FrameByFrame::new(&blob).unwrap();
+        let mut decoder = FrameByFrame::new(&blob, Limits::USUAL).unwrap();
         let decode = |readings: Vec<f32>, decoder: &mut FrameByFrame<'_>| {
             let mut moment = Moment::new(Frame { readings, ..Frame::default() });
             decoder.decode(&mut moment).unwrap();
@@ -183,7 +183,7 @@ mod tests {
         let rest = Synthesis::new(&scene.world).untouched().frames(Stream::Test, 20).inputs;
         let start_us: Vec<u64> = (0..20).map(|frame| 10_000 * frame).collect();
         let model = blob.prepare();
-        let mut decoder = FrameByFrame::new(&blob).unwrap();
+        let mut decoder = FrameByFrame::new(&blob, Limits::USUAL).unwrap();
         let mut decoded = vec![model.decode_table(&rest).values];
         // Without a baseline, and then with one, which is of the same readings.
         for baseline in [None, Some(rest.line(0))] {

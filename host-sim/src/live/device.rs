@@ -6,6 +6,7 @@ use std::time::{Duration, Instant};
 
 use clap::ValueEnum;
 use serde::Serialize;
+use taxel_core::health::Limits;
 use taxel_firmware::link::message::{ConfidenceSent, Configuration};
 use taxel_learn::ModelBlob;
 use taxel_recording::Layout;
@@ -49,8 +50,8 @@ pub struct Line {
     pub period_us: Option<u32>,
 }
 
-/// What opening told of a Taxel device: its identity, and whether it decodes.
-type Opened = Option<(DeviceIdentity, bool)>;
+/// What opening told of a Taxel device: its identity, whether it decodes, and limits of its readings.
+type Opened = Option<(DeviceIdentity, bool, Limits)>;
 
 /// Frames of a sensor on a serial line. After a loss of the line it is opened again.
 pub struct DeviceFeed<'b> {
@@ -59,6 +60,7 @@ pub struct DeviceFeed<'b> {
     /// Decoder of what the device does not decode.
     decoder: Option<FrameByFrame<'b>>,
     layout: Layout,
+    limits: Limits,
     source: String,
     listener: Option<Listener>,
     /// Time of the last scan, or of the last attempt to open the port.
@@ -84,6 +86,7 @@ impl<'b> DeviceFeed<'b> {
             blob,
             decoder,
             layout,
+            limits: Limits::USUAL,
             source,
             listener,
             last,
@@ -106,22 +109,23 @@ impl<'b> DeviceFeed<'b> {
             opened.recv().map_err(|_| Error::failed("an error in the program: no listener"))??;
         let (layout, device_decodes) = match (&opened, self.blob) {
             (_, Some(blob)) => {
-                let decodes = opened.as_ref().is_some_and(|(_, decodes)| *decodes);
+                let decodes = opened.as_ref().is_some_and(|(_, decodes, _)| *decodes);
                 (sheet::of_model(blob.parse().metadata(), None), decodes)
             }
-            (Some((identity, decodes)), None) => (sheet::of_device(identity), *decodes),
+            (Some((identity, decodes, _)), None) => (sheet::of_device(identity), *decodes),
             // A line tells its count by its first scans; it is likely that of before.
             (None, None) if !self.layout.readings.is_empty() => (self.layout.clone(), false),
             (None, None) => (self.shaped(self.line.shape.map_or(0, |[m, k]| m * k)), false),
         };
         self.source = match &opened {
-            Some((identity, _)) => {
+            Some((identity, ..)) => {
                 format!("{} at {}, firmware {}", identity.board, self.line.port, identity.firmware)
             }
             None => format!("{} at {} baud", self.line.port, self.line.baud),
         };
+        self.limits = opened.map_or(Limits::USUAL, |(.., limits)| limits);
         self.decoder = match self.blob {
-            Some(blob) if !device_decodes => Some(FrameByFrame::new(blob)?),
+            Some(blob) if !device_decodes => Some(FrameByFrame::new(blob, self.limits)?),
             _ => None,
         };
         if let (Some(decoder), Some(baseline)) = (&mut self.decoder, &self.baseline) {
@@ -213,12 +217,18 @@ fn open(
     };
     let sent = Sent { readings: true, estimates: decodes };
     let (scans, identity) = DeviceScans::new(device, configuration, Some(sent))?;
-    Ok((Box::new(scans), Some((identity, decodes))))
+    let Configuration { shorted_below_ohm, open_above_ohm, .. } = configuration;
+    let limits = Limits { shorted_below_ohm, open_above_ohm };
+    Ok((Box::new(scans), Some((identity, decodes, limits))))
 }
 
 impl Feed for DeviceFeed<'_> {
     fn layout(&self) -> &Layout {
         &self.layout
+    }
+
+    fn limits(&self) -> Limits {
+        self.limits
     }
 
     fn about(&self) -> About {

@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use taxel_core::health::Limits;
 use taxel_recording::Layout;
 use taxel_view::Action;
 use taxel_view::message::{Can, Kind};
@@ -41,6 +42,11 @@ pub trait Feed {
     /// Readings of the untouched sensor, as far as it knows them.
     fn baseline(&self) -> Option<Vec<f32>> {
         None
+    }
+
+    /// Limits of its readings in Ω that are believed.
+    fn limits(&self) -> Limits {
+        Limits::USUAL
     }
 
     /// Frames of the untouched sensor, if it can have some.

@@ -4,6 +4,7 @@ use std::collections::{BTreeSet, VecDeque};
 use std::path::Path;
 use std::time::{Duration, Instant};
 
+use taxel_core::health::Limits;
 use taxel_data::{Clock, DataFile, columns};
 use taxel_firmware::link::message::EstimateReport;
 use taxel_learn::ModelBlob;
@@ -272,7 +273,7 @@ fn decoder_for<'b>(blob: &'b ModelBlob, layout: &Layout) -> Result<FrameByFrame<
         let message = "--model: it takes other readings than the recording has";
         return Err(Error::Usage(message.into()));
     }
-    FrameByFrame::new(blob)
+    FrameByFrame::new(blob, Limits::USUAL)
 }
 
 impl Feed for ReplayFeed<'_> {

@@ -142,9 +142,9 @@ pub fn names(columns: &[Column]) -> impl Iterator<Item = &str> {
     columns.iter().map(|column| column.name.as_str())
 }
 
-/// Limits of readings that are believed, if all of them are in Ω.
-pub fn limits<'n>(mut names: impl Iterator<Item = &'n str>) -> Option<Limits> {
-    names.all(columns::is_judged_in_ohm).then_some(Limits::USUAL)
+/// These `limits` of readings that are believed, if all of them are in Ω.
+pub fn limits<'n>(mut names: impl Iterator<Item = &'n str>, limits: Limits) -> Option<Limits> {
+    names.all(columns::is_judged_in_ohm).then_some(limits)
 }
 
 /// Whether the model of this `metadata` takes the readings of `layout`, by their names.

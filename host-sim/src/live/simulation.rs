@@ -5,6 +5,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::thread;
 use std::time::{Duration, Instant};
 
+use taxel_core::health::Limits;
 use taxel_data::{Dataset, Silent, Stream};
 use taxel_learn::reading_model::Extent;
 use taxel_learn::{ModelBlob, Options};
@@ -96,7 +97,7 @@ impl<'b> SimulationFeed<'b> {
     /// # Errors
     /// If the model takes other readings than the scene has.
     pub fn new(scene: &Experiment, blob: &'b ModelBlob, frame_rate: f64) -> Result<Self> {
-        let decoder = FrameByFrame::new(blob)?;
+        let decoder = FrameByFrame::new(blob, Limits::USUAL)?;
         let model = blob.parse();
         let metadata = model.metadata();
         let readings = scene.world.reading_names();

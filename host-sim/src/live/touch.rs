@@ -42,11 +42,16 @@ pub struct Seen {
 }
 
 impl Touch {
-    /// Detector for the readings of `layout`, by the noise of frames at rest. They are its baseline too, unless one is known.
-    pub fn new(layout: &Layout, at_rest: &[Vec<f32>], baseline: Option<&[f32]>) -> Self {
+    /// Detector for the readings of `layout`, with these `limits` if they are in Ω, by the noise of frames at rest. They are its baseline too, unless one is known.
+    pub fn new(
+        layout: &Layout,
+        limits: Limits,
+        at_rest: &[Vec<f32>],
+        baseline: Option<&[f32]>,
+    ) -> Self {
         let mut touch = Self {
             grid: [layout.rows, layout.columns],
-            limits: sheet::limits(sheet::names(&layout.readings)),
+            limits: sheet::limits(sheet::names(&layout.readings), limits),
             baseline: mean(at_rest),
             deviations: vec![],
             begin: 0.0,
@@ -141,10 +146,10 @@ impl Touch {
 }
 
 /// What shows that `frames` are not steady: the touch that frames of either half, or their mean, are beside the other half.
-pub fn unsteady(layout: &Layout, frames: &[Vec<f32>]) -> Option<Seen> {
+pub fn unsteady(layout: &Layout, limits: Limits, frames: &[Vec<f32>]) -> Option<Seen> {
     let (first, second) = frames.split_at(frames.len() / 2);
     let seen = |rest: &[Vec<f32>], others: &[Vec<f32>]| {
-        let touch = Touch::new(layout, rest, None);
+        let touch = Touch::new(layout, limits, rest, None);
         // The difference of two means, with the noise of one frame.
         let gain = (first.len() as f32 / 2.0).sqrt();
         let pairs = touch.baseline.iter().zip(mean(others));
@@ -180,7 +185,12 @@ mod tests {
     fn start(scene: &str) -> (World, Touch) {
         let world = Experiment::load(scene).unwrap().world;
         let world = World { outputs: Outputs::Contact(vec![ContactOutput::Force]), ..world };
-        let touch = Touch::new(&layout(&world), &at_rest(&world, Stream::Training, 64), None);
+        let touch = Touch::new(
+            &layout(&world),
+            Limits::USUAL,
+            &at_rest(&world, Stream::Training, 64),
+            None,
+        );
         (world, touch)
     }
 
@@ -251,7 +261,8 @@ mod tests {
         }
         let (layout, rest) = (layout(&world), at_rest(&world, Stream::Test, 200 * 24));
         assert!(rest.chunks(24).all(|rest| touch.look(rest).is_none()));
-        let unsteady = rest.chunks(24).filter(|rest| unsteady(&layout, rest).is_some()).count();
+        let unsteady =
+            rest.chunks(24).filter(|rest| unsteady(&layout, Limits::USUAL, rest).is_some()).count();
         assert!(unsteady <= 10, "{unsteady} of 200 at rest");
     }
 

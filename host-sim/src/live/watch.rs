@@ -91,10 +91,11 @@ struct Watch<'w, 'b> {
 
 impl<'w, 'b> Watch<'w, 'b> {
     fn new(feed: &'w mut dyn Feed, view: &'w View, watched: &'w Watched<'b>) -> Self {
-        let wires = Wires::new(&feed.layout().readings);
+        let wires = Wires::new(&feed.layout().readings, feed.limits());
         let baseline = feed.baseline();
         let at_rest = feed.at_rest();
-        let touch = (!at_rest.is_empty()).then(|| Touch::new(feed.layout(), at_rest, None));
+        let touch =
+            (!at_rest.is_empty()).then(|| Touch::new(feed.layout(), feed.limits(), at_rest, None));
         Self {
             feed,
             view,
@@ -133,7 +134,7 @@ impl<'w, 'b> Watch<'w, 'b> {
                         "the recording has ended, because the sensor sends other frames now: {ended}"
                     ));
                 }
-                self.wires = Wires::new(&self.feed.layout().readings);
+                self.wires = Wires::new(&self.feed.layout().readings, self.feed.limits());
                 (self.baseline, self.newest) = (self.feed.baseline(), VecDeque::new());
                 (self.touch, self.is_touched, self.rest) = (None, false, "");
                 self.show_layout();
@@ -209,7 +210,8 @@ impl<'w, 'b> Watch<'w, 'b> {
         self.newest.push_back(frame.readings.clone());
         if self.touch.is_none()
             && self.newest.len() == ZERO_FRAMES
-            && unsteady(self.feed.layout(), self.newest.make_contiguous()).is_none()
+            && unsteady(self.feed.layout(), self.feed.limits(), self.newest.make_contiguous())
+                .is_none()
         {
             if self.baseline.is_none() {
                 self.rest = "first steady frames";
@@ -293,7 +295,9 @@ impl<'w, 'b> Watch<'w, 'b> {
         let touching = self.touch.as_ref().and_then(|touch| touch.look(frames));
         let why =
             if touching.is_some() { "something touches the sensor" } else { "it is not steady" };
-        if let Some(seen) = touching.or_else(|| unsteady(self.feed.layout(), frames)) {
+        if let Some(seen) =
+            touching.or_else(|| unsteady(self.feed.layout(), self.feed.limits(), frames))
+        {
             return Err(format!(
                 "not zeroed: {why}. S is {:.1} times the level at which a touch begins, and {} changes most; let go of the \
                  sensor, and try again",
@@ -311,7 +315,8 @@ impl<'w, 'b> Watch<'w, 'b> {
     /// Takes the newest frames for those at rest, with their mean for the baseline unless one is `known`.
     fn set_rest(&mut self, known: Option<Vec<f32>>) {
         let frames = self.newest.make_contiguous();
-        self.touch = Some(Touch::new(self.feed.layout(), frames, known.as_deref()));
+        self.touch =
+            Some(Touch::new(self.feed.layout(), self.feed.limits(), frames, known.as_deref()));
         let baseline = known.unwrap_or_else(|| mean(frames));
         self.view.set_baseline(baseline.clone());
         self.baseline = Some(baseline);

@@ -20,10 +20,10 @@ pub struct Wires {
 }
 
 impl Wires {
-    /// Wires of readings in these columns.
-    pub fn new(readings: &[Column]) -> Self {
+    /// Wires of readings in these columns, which have these `limits` if they are in Ω.
+    pub fn new(readings: &[Column], limits: Limits) -> Self {
         let names: Vec<String> = sheet::names(readings).map(String::from).collect();
-        let limits = sheet::limits(sheet::names(readings));
+        let limits = sheet::limits(sheet::names(readings), limits);
         Self { frames: VecDeque::new(), names, limits, faults: vec![] }
     }
 
@@ -129,7 +129,7 @@ mod tests {
         let names = ["r1c1_ohm", "r1c2_ohm", "r1c3_ohm", "r2c1_ohm", "r2c2_ohm", "r2c3_ohm"];
         let layout = sheet::layout("", sheet::columns(names, []), vec![], None);
         let judged = |broken: &[usize], ohm: f32| {
-            let mut wires = Wires::new(&layout.readings);
+            let mut wires = Wires::new(&layout.readings, Limits::USUAL);
             for frame in 0..20_u8 {
                 let mut readings = vec![100.0 + f32::from(frame % 3); 6];
                 broken.iter().for_each(|place| readings[*place] = ohm);

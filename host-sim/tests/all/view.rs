@@ -132,6 +132,18 @@ fn a_device_is_shown_with_names_by_checksum_recorded_and_zeroed() {
     let rest = vec![frames()[0]];
     crate::virtual_device::run(far, SOUND, blob.bytes(), rest);
     drop(near);
+    // Its own limits tell which readings are open: by the first ones all are.
+    for (ohm, open) in [("40", 1), ("1000", 0)] {
+        folder.succeed(&["link", &name, "configure", "--open-above-ohm", ohm]);
+        let page = Page::of(&folder, &[&name]);
+        let is_judged = |it: &Value| it["scan_rate"].as_f64().is_some_and(|rate| rate > 5.0);
+        let status = page.events().next("status", is_judged);
+        assert_eq!(status["wires"].as_array().unwrap().len(), open, "{status}");
+        page.end();
+        let record = ["link", &name, "record", "-n", "10", "-o", "readings.csv"];
+        let said = String::from_utf8(folder.run(&record).stderr).unwrap();
+        assert_eq!(said.contains("all readings open"), open == 1, "{said}");
+    }
     let page = Page::of(&folder, &[&name]);
     let mut events = page.events();
     let layout = events.any("layout");
