@@ -10,8 +10,8 @@ use crate::metrics::{self, DecoderErrors, Errors, Measure, of_decoder, rmse_of};
 use crate::subject::Subject;
 use crate::verdict::{HARDLY, Warning};
 
-/// Number of frames that a model is judged by on each other contact.
-pub const FRAMES: usize = 1000;
+/// Most frames that a model is judged by on each other contact.
+const MOST_FRAMES: usize = 1000;
 /// Ratio of errors from which another contact is decoded much worse.
 const MUCH_WORSE: f64 = 1.5;
 /// Share of novel frames in per cent from which a contact counts as noticed.
@@ -44,12 +44,14 @@ pub struct OtherErrors {
 /// Frames of other contacts, by name.
 pub type OtherFrames = Vec<(String, Dataset)>;
 
-/// Frames of all other contacts of a subject. Measurements have none.
+/// Frames of all other contacts of a subject, of each as many as the scene has test frames, but at most 1000. Measurements have
+/// none.
 pub fn frames(subject: &Subject) -> OtherFrames {
     let Some(scene) = subject.scene() else { return vec![] };
+    let count = scene.test_frames.min(MOST_FRAMES);
     let of = |other: &OtherContact| {
         let moved = Synthesis::new(&scene.world).moved_by(&other.deformation);
-        (other.name.clone(), scene.dataset(&moved, Stream::Test, FRAMES))
+        (other.name.clone(), scene.dataset(&moved, Stream::Test, count))
     };
     scene.others.iter().map(of).collect()
 }
@@ -79,11 +81,8 @@ impl Others {
             percent_novel: novel(&frames.inputs.values),
         });
         let own_percent_novel = novel(&own.inputs.values);
-        (!frames.is_empty()).then(|| Self {
-            frames: FRAMES,
-            own_percent_novel,
-            contacts: contacts.collect(),
-        })
+        let (_, first) = frames.first()?;
+        Some(Self { frames: first.frames(), own_percent_novel, contacts: contacts.collect() })
     }
 
     /// Warning of contacts that are decoded much worse than the scene's, and not noticed.

@@ -17,7 +17,7 @@ fn others(contacts: &[(&str, f64, f64, Option<f64>)]) -> Others {
         percent_novel: *percent_novel,
     });
     let contacts: Vec<OtherErrors> = contacts.collect();
-    Others { frames: FRAMES, own_percent_novel: contacts[0].percent_novel, contacts }
+    Others { frames: 1000, own_percent_novel: contacts[0].percent_novel, contacts }
 }
 
 /// Warning beside an RMSE of 0.04 mm and an R² of 0.96 on own contacts.
@@ -71,6 +71,8 @@ fn a_model_is_judged_by_other_contacts_of_its_own_sensor() {
     let blob = scene.train(&Silent).unwrap();
     let model = blob.prepare();
     let measure = scene.measure();
+    let few = Experiment { test_frames: 60, ..scene.clone() };
+    assert!(frames(&Subject::Scene(few.into())).iter().all(|(_, it)| it.frames() == 60));
     let subject = Subject::Scene(scene.into());
     let frames = frames(&subject);
     let names: Vec<&str> = frames.iter().map(|(name, _)| name.as_str()).collect();
@@ -90,7 +92,7 @@ fn a_model_is_judged_by_other_contacts_of_its_own_sensor() {
     let found =
         Others::new(&frames, (&model, &Mean::fit(&training.frames)), &own, &measure).unwrap();
     for ((_, frames), found) in frames.iter().zip(&found.contacts) {
-        assert_eq!((frames.frames(), &frames.outputs.names), (FRAMES, &own.outputs.names));
+        assert_eq!((frames.frames(), &frames.outputs.names), (1000, &own.outputs.names));
         let judged = metrics::judge(&model, frames, &measure);
         assert_eq!(judged.errors[2].rmse, found.errors[2].rmse);
         assert!(found.mean[2].rmse > 0.05 && found.errors[2].ratio_to_limit.is_none());
