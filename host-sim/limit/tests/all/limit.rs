@@ -55,23 +55,32 @@ fn rows<'w>(world: &'w World, wires: &'w [usize]) -> Rows<'w> {
     Rows { world, motion: &*world.motion, model, wires, deviation_ohm: &[] }
 }
 
+/// Rows and columns all over the sensor of [`World::press`], few enough for a quick test.
+fn thinned_press() -> World {
+    let mut world = World { read_rows: vec![1, 4, 6], ..World::press() };
+    world.sensor = world.sensor.with_columns(&[0, 3, 6, 9, 12, 15]);
+    world
+}
+
 /// Where noise is low, the posterior is normal, and its covariance that of Cramér and Rao with the prior (van Trees):
 /// G·(I + JᵀJ)⁻¹·Gᵀ, with the slopes J of readings over their noise, and G of outputs, over the latents.
+/// The median of frames does not depend on the few whose readings hardly tell two places apart.
 #[test]
 fn low_noise_comes_to_the_cramer_rao_bound() {
     let depth_mm = [0.2, 1.0];
     let dent = Dent::new(Profile::Press, &[[2.0, 5.0]], [depth_mm, [0.1, 0.5]]);
-    for level in [0.0002, 0.0005] {
+    for level in [0.0001, 0.0005] {
         let mut world = World { motion: dent.into(), ..World::press() };
         world.outputs = Outputs::Contact(vec![ContactOutput::Centre, ContactOutput::Depth]);
         world.noise.level = level;
+        world.sensor = world.sensor.with_columns(&[0, 2, 4, 6, 8, 10, 12, 14, 16]);
         let limit = Limit::new(&world).unwrap();
         let rows = rows(&world, &world.read_rows);
         let (n, mut memory) = (rows.latents(), rows.memory());
         // A frame a lane: at least a radius from the edges. Differences of each latent stand in lanes of their own.
         let mut random = Random::new(7, Stream::Test, Purpose::Contact, 0, 0);
-        let mut ratios = [0.0; 3];
-        for _ in 0..50 {
+        let mut ratios = [const { Vec::new() }; 3];
+        for _ in 0..31 {
             let near_the_middle = |i: usize| if i < 2 { 0.5 } else { 1.0 };
             let truth: Vec<f64> = (0..n).map(|i| near_the_middle(i) * random.normal()).collect();
             let mut latents: Vec<Lanes> = truth.iter().map(|x| [*x; LANES]).collect();
@@ -96,12 +105,13 @@ fn low_noise_comes_to_the_cramer_rao_bound() {
             let posterior = &limit.posteriors(&noisy, &Silent)[0];
             assert!(posterior.effective.iter().all(|size| *size >= 100.0), "{posterior:?}");
             let bounded = posterior.variance.iter().zip(&variances);
-            for (ratio, (variance, bound)) in ratios.iter_mut().zip(bounded) {
-                *ratio += variance / bound / 50.0;
+            for (ratios, (variance, bound)) in ratios.iter_mut().zip(bounded) {
+                ratios.push(variance / bound);
             }
         }
-        for (output, ratio) in ratios.iter().enumerate() {
-            let ratio = ratio.sqrt();
+        for (output, mut ratios) in ratios.into_iter().enumerate() {
+            ratios.sort_by(f64::total_cmp);
+            let ratio = f64::sqrt(ratios[ratios.len() / 2]);
             assert!((ratio - 1.0).abs() < 0.05, "noise {level}, output {output}: {ratio}");
         }
     }
@@ -205,7 +215,7 @@ fn a_mix_has_posteriors_of_each_kind() {
     let dents = [of(Profile::Punch, &[[1.0, 3.0], [0.5, 1.0]]), of(Profile::Press, &[[2.0, 5.0]])];
     let part = |dent: Dent| Part { weight: 1.0, deformation: dent.into() };
     let mut world =
-        World { motion: Mix { parts: dents.map(part).to_vec() }.into(), ..World::press() };
+        World { motion: Mix { parts: dents.map(part).to_vec() }.into(), ..thinned_press() };
     world.noise.level = 0.001;
     Reference::new(&world, 40, &Silent).unwrap();
 }
@@ -224,7 +234,7 @@ fn noise_of_a_span_is_that_of_each_row() {
 /// A contact that is held where it is tells as much in n frames of the noise √n·p as in one of the noise p.
 #[test]
 fn a_contact_that_moves_by_nothing_has_the_limit_of_a_still_one() {
-    let mut world = World { read_rows: vec![3, 4], ..World::press() };
+    let mut world = thinned_press();
     let still = Reference::new(&world, 200, &Silent).unwrap().limits();
     world.path = Some(Path {
         peak_depth_mm: Some([0.0, 1.0]),
@@ -232,10 +242,10 @@ fn a_contact_that_moves_by_nothing_has_the_limit_of_a_still_one() {
         half_length_mm: Some([[0.0; 2]; 2]),
         ..Path::at(0.0, 0.0)
     });
-    world.noise.level *= 3.0;
-    let timetable = Timetable::every(0.01, 0.01, 0.1).unwrap();
-    // Scans are finished at 10 ms, 20 ms, …; nine of them at each moment.
-    let moments_s: Vec<f64> = (0..32).map(|it| 0.09 + 3e-4 * f64::from(it)).collect();
+    world.noise.level *= 2.0_f64.sqrt();
+    // Scans are finished at 10, 20 and 30 ms; two of them at each moment.
+    let timetable = Timetable::every(0.01, 0.01, 0.03).unwrap();
+    let moments_s: Vec<f64> = (0..16).map(|it| 0.02 + 5e-4 * f64::from(it)).collect();
     let moving = Reference::moving(&world, (&timetable, 0.01), &moments_s).unwrap();
     for (still, moving) in still.iter().zip(moving.limits()) {
         let error = still.limit_standard_error.hypot(moving.limit_standard_error);
