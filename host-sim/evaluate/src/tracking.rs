@@ -221,7 +221,8 @@ mod tests {
     /// A model of the scene `moving` with a tracker, in the time that a test has.
     fn trained() -> (Experiment, ModelBlob) {
         let mut scene = Experiment::load("moving").unwrap();
-        scene.world.path.as_mut().unwrap().trajectories = 8;
+        let path = scene.world.path.as_mut().unwrap();
+        (path.trajectories, path.duration_s) = (8, 0.2);
         (scene.frames, scene.training.refine, scene.training.track) = (2000, false, true);
         let blob = scene.train(&Silent).unwrap();
         (scene, blob)

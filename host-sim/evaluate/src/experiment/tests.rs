@@ -129,8 +129,11 @@ fn scenes_that_take_hours_to_compute_are_refused() {
     let huge = crate::scenes::ALL[1].1.replace(of_columns, &wires(1000));
     let refused = Experiment::parse("test", &huge).unwrap_err().to_string();
     assert!(refused.contains("48 × 10000000 electrodes"), "{refused}");
+    // A row of 1000 electrodes has as many pairs with fewer lower electrodes, which are laid out sooner.
     let one = huge.replace("\nrow_wires = 8", "\nrow_wires = 1");
-    let refused = Experiment::parse("test", &one).unwrap_err().to_string();
+    let long = "\nelectrodes_per_row_wire = 1000";
+    let long = one.replace("\nelectrodes_per_row_wire = 6", long).replace(&wires(1000), &wires(6));
+    let refused = Experiment::parse("test", &long).unwrap_err().to_string();
     assert!(refused.contains("training.frames") && refused.contains("take hours"), "{refused}");
     let large = one.replace(&wires(1000), &wires(20));
     let scene = Experiment::parse("test", &large).unwrap();
