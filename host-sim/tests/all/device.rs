@@ -11,6 +11,7 @@ use taxel_core::filter::Settings;
 use taxel_data::{Silent, Stream};
 use taxel_firmware::link::message::Configuration;
 use taxel_learn::ModelBlob;
+use taxel_learn::reading_model::Extent;
 use taxel_rig::device::check::{Frames, Plan, check};
 use taxel_rig::device::{Device, upload};
 use taxel_simulate::{Synthesis, World, synthesise};
@@ -153,6 +154,24 @@ fn a_tracker_is_checked_with_a_baseline_and_without() {
         let findings = check(&mut device, &frames, &model, &plan, &Silent).unwrap();
         assert_eq!(findings.frames.bit_identical, 40);
     }
+}
+
+#[test]
+fn missing_readings_are_filled_alike_on_both_sides() {
+    let mut scene = unrefined("press");
+    (scene.frames, scene.training.options.centres) = (1500, 3);
+    scene.training.reading_model = Some(Extent::Full);
+    let model = scene.train(&Silent).unwrap();
+    let mut frames = frames_of(30);
+    let mut readings_ohm = frames.readings.values.to_vec();
+    // A reading of every third frame is missing, and half of the last frame, which is not filled then.
+    readings_ohm.iter_mut().step_by(3 * 144 + 1).for_each(|ohm| *ohm = f64::NAN);
+    readings_ohm[29 * 144..][..72].fill(f64::NAN);
+    frames.readings.values = readings_ohm.into();
+    let mut device = device(SOUND, &model);
+    let plan = Plan { window: 1, filter: Settings::default() };
+    let findings = check(&mut device, &frames, &model, &plan, &Silent).unwrap();
+    assert_eq!(findings.frames.bit_identical, 30);
 }
 
 #[cfg(target_os = "linux")]

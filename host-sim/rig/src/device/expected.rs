@@ -53,15 +53,21 @@ impl Expected {
             None => model,
         };
         let is_tracked = model.model().tracker().is_some() && !filter.is_on();
-        let series = Series { start_us: &start_us, faulty: &[], baseline: baseline_ohm };
-        let outputs = decode_series(&model, readings, series, filter);
+        let filled = model.filled(&readings.values, None).map(|(values, _)| values);
+        let values = filled.map_or_else(|| readings.values.clone(), Into::into);
+        let filled = &Table { names: readings.names.clone(), values };
+        let places = readings.values.iter().enumerate();
+        let missing: Vec<usize> =
+            places.filter(|(_, ohm)| ohm.is_nan()).map(|(place, _)| place).collect();
+        let series = Series { start_us: &start_us, faulty: &missing, baseline: baseline_ohm };
+        let outputs = decode_series(&model, filled, series, filter);
         let f32s =
             |values: &[f64]| -> Vec<f32> { values.iter().map(|value| *value as f32).collect() };
         let per_frame = [readings.names.len(), outputs.names.len()];
         let none = is_tracked.then(|| vec![f32::NAN; per_frame[0]]); // for the one that a device may have
         let (baseline_ohm, readings_ohm) =
             (baseline_ohm.map(f32s).or(none), f32s(&readings.values));
-        let confidence = confidence(&model, readings);
+        let confidence = confidence(&model, filled);
         let outputs = f32s(&outputs.values);
         Self {
             readings_ohm,
