@@ -37,6 +37,11 @@ impl Configuration {
         Settings { time_constant_us: self.filter_time_constant_us, lead_us: self.filter_lead_us }
     }
 
+    /// Limits in Ω of sound readings.
+    pub fn limits(&self) -> Limits {
+        Limits { shorted_below_ohm: self.shorted_below_ohm, open_above_ohm: self.open_above_ohm }
+    }
+
     /// Thresholds of events.
     pub fn events(&self) -> events::Settings {
         events::Settings { load: self.load_threshold, slip_mm_per_s: self.slip_mm_per_s }

@@ -2,7 +2,7 @@
 
 use taxel_core::blob::{Columns, Floats, ModelShape};
 use taxel_core::contact::Detector;
-use taxel_core::health::{Health, Limits};
+use taxel_core::health::Health;
 
 use super::frame_clock::FrameClock;
 use super::link::Link;
@@ -129,10 +129,7 @@ impl<'m, F: FrameSource, const ROWS: usize> Sensor<'m, F, ROWS> {
 
     /// Looks for faulty readings, which are NaN then.
     pub fn judge_frame(&mut self) -> Health {
-        let limits = Limits {
-            shorted_below_ohm: self.configuration.shorted_below_ohm,
-            open_above_ohm: self.configuration.open_above_ohm,
-        };
+        let limits = self.configuration.limits();
         let frame = self.frame.get_mut(..self.wiring.readings).unwrap_or_default();
         Health::new(frame, self.wiring.line, limits, &mut self.faulty_columns)
     }

@@ -217,9 +217,7 @@ fn open(
     };
     let sent = Sent { readings: true, estimates: decodes };
     let (scans, identity) = DeviceScans::new(device, configuration, Some(sent))?;
-    let Configuration { shorted_below_ohm, open_above_ohm, .. } = configuration;
-    let limits = Limits { shorted_below_ohm, open_above_ohm };
-    Ok((Box::new(scans), Some((identity, decodes, limits))))
+    Ok((Box::new(scans), Some((identity, decodes, configuration.limits()))))
 }
 
 impl Feed for DeviceFeed<'_> {

@@ -5,6 +5,7 @@ use std::time::Duration;
 use taxel_core::filter::Settings;
 use taxel_data::{Progress, Table};
 use taxel_firmware::link::message::{Configuration, EstimateReport};
+use taxel_learn::infer::is_missing;
 use taxel_learn::tracked::{Series, decode_series};
 use taxel_learn::{ModelBlob, PreparedModel};
 
@@ -58,7 +59,7 @@ impl Expected {
         let filled = &Table { names: readings.names.clone(), values };
         let places = readings.values.iter().enumerate();
         let missing: Vec<usize> =
-            places.filter(|(_, ohm)| ohm.is_nan()).map(|(place, _)| place).collect();
+            places.filter(|(_, ohm)| is_missing(**ohm)).map(|(place, _)| place).collect();
         let series = Series { start_us: &start_us, faulty: &missing, baseline: baseline_ohm };
         let outputs = decode_series(&model, filled, series, filter);
         let f32s =

@@ -9,7 +9,6 @@ use crate::report::Sections;
 use crate::{Error, Result};
 use clap::Args;
 use taxel_core::blob::Model;
-use taxel_core::health::Limits;
 use taxel_data::{Table, csv_file};
 use taxel_firmware::link::message::{Configuration, EstimateReport, Report, Request, Setting};
 use taxel_learn::ModelBlob;
@@ -164,10 +163,8 @@ pub fn record(
     let lines: Vec<Vec<f64>> = scans.iter().map(values).collect();
     let missing = missing(lines.iter().flat_map(|line| &line[..outputs]), wanted)?;
     if wanted == Wanted::Readings {
-        let Configuration { shorted_below_ohm, open_above_ohm, .. } = configuration;
-        let limits = Limits { shorted_below_ohm, open_above_ohm };
         let readings = Table { names: names.clone(), values: lines.concat().into() };
-        note_faults(&readings, limits, common);
+        note_faults(&readings, configuration.limits(), common);
     }
     match recorder {
         Some(recorder) => drop(recorder.finish()?),
